@@ -1,7 +1,8 @@
 //! What a stage may ask of the runner.
 
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use crate::artifact::RowWriter;
 use crate::recording::InputFiles;
@@ -19,6 +20,23 @@ pub struct Context<'a> {
     progress: &'a dyn Progress,
     scratch: Scratch,
     files: InputFiles,
+    cancel: Cancel,
+}
+
+/// Whether work that is under way shall end without a result. Clones share it.
+#[derive(Debug, Clone, Default)]
+pub struct Cancel(Arc<AtomicBool>);
+
+impl Cancel {
+    /// It shall.
+    pub fn cancel(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it shall.
+    pub fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
 }
 
 /// Where progress goes. Implementations are called from several threads.
@@ -49,6 +67,7 @@ impl<'a> Context<'a> {
             progress,
             scratch: Scratch::default(),
             files: InputFiles::new(),
+            cancel: Cancel::default(),
         }
     }
 
@@ -67,6 +86,17 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn with_files(self, files: InputFiles) -> Self {
         Self { files, ..self }
+    }
+
+    /// The same ended by `cancel`: for a stage that is run by itself. The runner's stages end with its process.
+    #[must_use]
+    pub fn with_cancel(self, cancel: Cancel) -> Self {
+        Self { cancel, ..self }
+    }
+
+    /// Whether the stage shall end; long ones look.
+    pub fn cancel(&self) -> &Cancel {
+        &self.cancel
     }
 
     /// What opens and hashes input files.

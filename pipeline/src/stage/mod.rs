@@ -10,7 +10,7 @@ mod spec;
 
 pub use bounds::{Bounds, check};
 pub(crate) use bounds::{range, resolve};
-pub use context::{Context, NoProgress, Progress};
+pub use context::{Cancel, Context, NoProgress, Progress};
 pub use entry::{DynStage, Entry, Maker, ParamError};
 pub use example::run_example;
 pub(crate) use example::{example_inputs, instance, run_in_folder};

@@ -70,7 +70,7 @@ pub mod validation;
 pub mod vector_fitting;
 
 pub use faer::{Mat, c64};
-pub use monitor::{Monitor, Unwatched};
+pub use monitor::{Monitor, Unwatched, Watch};
 
 #[cfg(test)]
 mod draws;

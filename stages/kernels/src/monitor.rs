@@ -1,5 +1,10 @@
 //! Who watches a long kernel: how far it is, and whether it shall go on.
 
+use std::fmt;
+use std::sync::Arc;
+
+use crate::model::ModelError;
+
 /// Kernels that fit many times call it from any thread, between fits.
 ///
 /// ```
@@ -35,3 +40,34 @@ pub trait Monitor: Sync {
 pub struct Unwatched;
 
 impl Monitor for Unwatched {}
+
+/// Who watches, or nobody: what the options of a long fit carry. Two are equal always: who watches changes no result.
+#[derive(Clone, Default)]
+pub struct Watch(Option<Arc<dyn Monitor + Send>>);
+
+impl Watch {
+    /// Watched by this one.
+    pub fn by(monitor: Arc<dyn Monitor + Send>) -> Self {
+        Self(Some(monitor))
+    }
+
+    /// Errors: the monitor wants the fit to end.
+    pub fn check(&self) -> Result<(), ModelError> {
+        match &self.0 {
+            Some(monitor) if monitor.is_cancelled() => Err(ModelError::Cancelled),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl PartialEq for Watch {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "Watch(somebody)" } else { "Watch(nobody)" })
+    }
+}

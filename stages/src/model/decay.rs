@@ -14,6 +14,7 @@ use self::tables::{fit_array, hit_table, modes_with_lack, summary};
 use super::count::Count;
 use crate::artifacts::{Decays, shape_array};
 use crate::events::DECAYS;
+use crate::watched::watch;
 use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, follow_channels};
 
 /// Fits modes and mode shapes to free decays: one set of poles for all channels of all hits.
@@ -114,12 +115,12 @@ impl Stage for DecayFit {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let mut decays = long_enough(Decays::new(inputs.get(&DECAYS)?)?, cx)?;
-        let systems = Systems::of(&decays, &self.options());
+        let systems = Systems::of(&decays, &self.options(cx));
         systems.choose(self.system, &mut decays)?;
         systems.warning(self.system).into_iter().for_each(|warning| cx.warn(warning));
         let decays = decays;
         let whole = self.part == FittedPart::Whole;
-        let options = ChannelOptions { missing: decays.missing(), ..self.options() };
+        let options = ChannelOptions { missing: decays.missing(), ..self.options(cx) };
         let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
             .map_err(StageError::from_error)?;
         followed.fit.add_error_of_rate(decays.rate_relative_std);
@@ -180,7 +181,7 @@ fn long_enough<'a>(mut decays: Decays<'a>, cx: &Context) -> Result<Decays<'a>, S
 const MOST_NAMED: usize = 10;
 
 impl DecayFit {
-    fn options(&self) -> ChannelOptions {
+    fn options(&self, cx: &Context) -> ChannelOptions {
         ChannelOptions {
             modes: match self.modes {
                 Count::Fixed(modes) => ModesWanted::Fixed(modes),
@@ -190,6 +191,7 @@ impl DecayFit {
                 DecayNoise::Estimated => ChannelNoise::Estimated,
                 DecayNoise::White => ChannelNoise::White,
             },
+            watch: watch(cx),
             ..self.fit.clone()
         }
     }

@@ -11,7 +11,7 @@ use super::order::{Order, choice_document, simulated_percent};
 use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
 use crate::ensemble::LEAST_EVENTS;
-use crate::watched::Watched;
+use crate::watched::{Watched, watch};
 use afmid_kernels::model::ModelError;
 use afmid_kernels::pem::{Ending, Experiment, Focus, Identified, NoiseModel, PemOptions, identify};
 use afmid_kernels::validation::{
@@ -111,13 +111,13 @@ impl Stage for Pem {
         let choice = match self.order {
             Order::Fixed(_) => None,
             Order::Auto => {
-                let options = self.options(self.max_order);
+                let options = self.options(self.max_order, cx);
                 Some(choose_order(experiment, 1.0 / rate, self.max_order, &options, &Watched(cx)))
             }
         };
         let choice = choice.transpose().map_err(StageError::from_error)?;
         let order = choice.as_ref().map_or(self.order.largest(0), |choice| choice.order);
-        let fit = identify(&[experiment], 1.0 / rate, &self.options(order)).map_err(StageError::from_error)?;
+        let fit = identify(&[experiment], 1.0 / rate, &self.options(order, cx)).map_err(StageError::from_error)?;
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} iterations: the gradient is {:.1e} of the residual, {:.2} standard errors; try another order",
@@ -156,8 +156,8 @@ impl Stage for Pem {
 }
 
 impl Pem {
-    fn options(&self, order: usize) -> PemOptions {
-        PemOptions { order, ..self.fit.clone() }
+    fn options(&self, order: usize, cx: &Context) -> PemOptions {
+        PemOptions { order, watch: watch(cx), ..self.fit.clone() }
     }
 
     /// Errors: a half is asked for, and the pair has none.

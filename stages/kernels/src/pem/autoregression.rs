@@ -134,6 +134,7 @@ mod tests {
                 missing: Vec::new(),
                 priors: 0,
                 buffers: BufferPool::default(),
+                watch: crate::Watch::default(),
             };
             let found = least_bic(levinson(&autocovariance(&problem, &y, 12)), 4000).coefficients;
             // standard error sqrt((1 - 0.8^2) / 4000) = 0.0095: four of them; BIC errs upwards in one of hundreds

@@ -98,6 +98,7 @@ mod tests {
             missing: Vec::new(),
             priors: 0,
             buffers: BufferPool::default(),
+            watch: crate::Watch::default(),
         };
         let start = |angles, radius| ranked(&problem, output_errors(&[poles(angles, radius)]), 1).unwrap().remove(0);
         let limits = Limits { iterations: 20, gradient: 1e-4 };

@@ -118,5 +118,6 @@ pub(super) fn checked<'a>(
         missing,
         priors: 0,
         buffers: BufferPool::default(),
+        watch: options.watch.clone(),
     })
 }

@@ -125,6 +125,7 @@ impl Objective for PredictionErrors<'_, '_> {
     }
 
     fn local(&mut self, at: &mut State) -> Result<Option<Local>, ModelError> {
+        self.problem.watch.check()?;
         let coordinates = at.point.coordinates();
         let linearised = Linearised::new(&at.sensitivities(self.problem)?, &coordinates)?;
         at.gradient = linearised.share() / at.projection.cost.sqrt();

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::covariance::ResidualColour;
+use crate::Watch;
 use crate::model::{InnovationsModel, InputGains, ModelError};
 use crate::modes::{ModeCriteria, Pole, PoleClass, poles};
 use crate::optimise::Ending;
@@ -61,6 +62,9 @@ pub struct PemOptions {
     /// How the covariance treats the residual.
     #[serde(skip)]
     pub colour: ResidualColour,
+    /// Who watches, and may end it.
+    #[serde(skip)]
+    pub watch: Watch,
 }
 
 impl Default for PemOptions {
@@ -77,6 +81,7 @@ impl Default for PemOptions {
             prior: 0.0,
             gradient_tolerance: 1e-4,
             colour: ResidualColour::Spectrum,
+            watch: Watch::default(),
         }
     }
 }

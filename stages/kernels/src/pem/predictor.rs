@@ -6,6 +6,7 @@
 use super::columns::{BufferPool, Columns, Part, Place, SIDE_BY_SIDE};
 use super::data::Record;
 use super::whitening::{IMPULSE, INPUT, LANES, ONE, OUTPUT, RAMP, Signals, Whitened};
+use crate::Watch;
 use crate::model::Coefficients;
 
 /// What the errors are computed from: the experiments share everything but initial state, offset and slope.
@@ -23,6 +24,8 @@ pub(crate) struct Problem<'a> {
     pub priors: usize,
     /// Storage of columns, used again and again.
     pub buffers: BufferPool,
+    /// Who watches, and may end it.
+    pub watch: Watch,
 }
 
 /// Share of the output's changes that a shortened problem sees, and its least samples for each linear parameter.
@@ -70,6 +73,7 @@ impl<'a> Problem<'a> {
             experiments,
             missing: Vec::new(),
             buffers: self.buffers.clone(),
+            watch: self.watch.clone(),
             ..*self
         })
     }

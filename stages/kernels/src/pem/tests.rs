@@ -172,6 +172,7 @@ fn sensitivities_agree_with_differences() {
         missing: Vec::new(),
         priors: 0,
         buffers: BufferPool::default(),
+        watch: crate::Watch::default(),
     };
     let z = |re, im| faer::c64::new(re, im);
     let a = coordinates(&[z(0.99, 0.06), z(0.99, -0.06), z(0.9, 0.3), z(0.9, -0.3), z(0.4, 0.0)]);
@@ -310,6 +311,7 @@ fn a_release_is_cut_where_it_has_died_away_and_noise_is_not() {
         missing: Vec::new(),
         priors: 0,
         buffers: BufferPool::default(),
+        watch: crate::Watch::default(),
     };
     let (u, y, noise) = (force(), averaged(1), white_noise(N, 1.0, 1));
     let whole = problem(&u, &y);

@@ -6,6 +6,7 @@ use faer::c64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Watch;
 use crate::model::ModelError;
 use crate::ringdown::RingdownNoise;
 
@@ -57,6 +58,9 @@ pub struct ChannelOptions {
     /// Missing samples per event and channel, clipped say; default empty: none. What stands there is never used.
     #[serde(skip)]
     pub missing: Vec<Vec<Vec<Range<usize>>>>,
+    /// Who watches, and may end it.
+    #[serde(skip)]
+    pub watch: Watch,
 }
 
 impl Default for ChannelOptions {
@@ -69,6 +73,7 @@ impl Default for ChannelOptions {
             least_quality_factor: 0.5005,
             start: Vec::new(),
             missing: Vec::new(),
+            watch: Watch::default(),
         }
     }
 }

@@ -70,6 +70,7 @@ pub fn fit_channels(
     for stretch in free.iter().flatten() {
         finite("free stretch", stretch)?;
     }
+    options.watch.check()?;
     let records = Records::of(events, interval_s, options)?;
     let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
     let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
@@ -243,6 +244,7 @@ impl Ladder<'_> {
         let mut best: Option<Step> = None;
         let mut place = 0;
         for modes in 1..=most {
+            self.options.watch.check()?;
             let Some(next) = self.next(&current, all_noise.take().as_deref(), modes <= least) else { break };
             let places = &next.fitted.poles.0[place.min(modes - 1)..];
             let white = self.white_gain(&needed, &next, places);
