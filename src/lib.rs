@@ -23,11 +23,14 @@ mod scaffold;
 mod show;
 mod sweep;
 
+use std::ffi::OsString;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::process::ExitCode;
 
-use afmid_pipeline::Registry;
+use afmid_pipeline::own_command::own_arguments;
 use afmid_pipeline::stage::DoubleName;
+use afmid_pipeline::{InputFiles, Registry};
 use clap::FromArgMatches;
 
 #[doc(hidden)]
@@ -40,8 +43,15 @@ pub fn registry() -> Result<Registry, DoubleName> {
     afmid_stages::registry()
 }
 
-/// The command line of a program with these stages: parses the arguments, runs the command, reports.
+/// The command line of a program with these stages: parses the arguments, runs the command, reports. Of an interpreter
+/// that runs it, the arguments that are its own are stated first
+/// ([`own_arguments_are_last`](afmid_pipeline::own_command::own_arguments_are_last)).
 pub fn main(registry: &Registry) -> ExitCode {
+    ExitCode::from(exit_code(registry))
+}
+
+/// As [`main`]: the exit code as a number.
+pub fn exit_code(registry: &Registry) -> u8 {
     if let Some(code) = afmid_pipeline::plugin::host_main() {
         return code;
     }
@@ -50,17 +60,24 @@ pub fn main(registry: &Registry) -> ExitCode {
         // a signal ends the program as the system does it
         output::say(&format!("warning: signals cannot be caught: {error}\n"));
     }
-    let parsed = cli::command().try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches));
+    let arguments = std::iter::once(OsString::from("afmid")).chain(own_arguments());
+    let parsed =
+        cli::command().try_get_matches_from(arguments).and_then(|matches| cli::Cli::from_arg_matches(&matches));
     let done = match parsed {
         Ok(cli) => commands::dispatch(cli.command, registry),
         Err(error) => help_or_mistake(&error),
     };
-    interrupt::check().and(done).map_or_else(output::report, |()| ExitCode::SUCCESS)
+    interrupt::check().and(done).map_or_else(output::report, |()| 0)
+}
+
+/// What `inspect --json` says of a file, as JSON text.
+pub fn inspect_json(path: &Path) -> String {
+    inspect::inspected_json(&inspect::inspect(path, &InputFiles::new())).to_string()
 }
 
 /// How a program ends whose stages do not make a registry.
 pub fn fail(error: &DoubleName) -> ExitCode {
-    output::report(Failure::failed(error, None))
+    ExitCode::from(output::report(Failure::failed(error, None)))
 }
 
 /// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed

@@ -1,7 +1,6 @@
 //! All that goes to stdout and stderr, none of it raw.
 
 use std::io::{ErrorKind, Write};
-use std::process::ExitCode;
 
 use crate::failure::Failure;
 use crate::printable::printable;
@@ -25,10 +24,10 @@ pub fn print_styled(text: &str) -> Result<(), Failure> {
 }
 
 /// How a command ends that does not succeed: said on stderr, with its exit code.
-pub fn report(failure: Failure) -> ExitCode {
+pub fn report(failure: Failure) -> u8 {
     let (text, code) = failure.text_and_code();
     say_styled(&text);
-    ExitCode::from(code)
+    code
 }
 
 /// Says something on stderr, in one call, so that lines of several threads don't mix. If stderr takes nothing, there is

@@ -17,6 +17,7 @@ pub mod files;
 pub mod graph;
 pub mod hdf5_files;
 pub mod outcome;
+pub mod own_command;
 pub mod plugin;
 pub mod recording;
 pub mod reference;

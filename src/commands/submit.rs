@@ -9,6 +9,7 @@ use std::process::Command;
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::files::FilledFolder;
+use afmid_pipeline::own_command::own_file;
 use afmid_pipeline::plugin::{AllStages, Candidate};
 use serde_json::json;
 
@@ -61,8 +62,7 @@ fn slurm(args: &SlurmArgs, registry: &Registry) -> Result<(), Failure> {
         ENVIRONMENT.iter().filter_map(|name| Some((*name, std::env::var_os(name)?))).collect();
     let jobs = Jobs {
         name: plan.name(),
-        program: &std::env::current_exe()
-            .map_err(|error| Failure::failed(format!("afmid cannot find itself: {error}"), None))?,
+        program: &own_file().map_err(|error| Failure::failed(format!("afmid cannot find itself: {error}"), None))?,
         config: &absolute(&args.config.config)?,
         folder: &folder,
         cache: &cache,

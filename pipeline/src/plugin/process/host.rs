@@ -14,8 +14,8 @@ use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::path::Path;
+use std::process::Command;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -26,10 +26,14 @@ use rustix::process::{
 
 use super::confinement::confine;
 use super::descendants::kill_descendants;
+use crate::own_command::{own_arguments, own_command};
 use crate::plugin::launch::Launch;
 
 const HOST: &str = "__plugin-host";
 const START: &str = "__plugin-start";
+
+/// The name of a host in lists of processes.
+const HOST_NAME: &str = "plugin-host";
 
 /// How a plugin is started.
 const CONFINED: &str = "confined";
@@ -37,22 +41,18 @@ const FREE: &str = "free";
 
 /// A program that calls [`host_main`] at its beginning, and so can stand between this one and a plugin.
 #[derive(Debug, Clone)]
-pub struct Host {
-    program: PathBuf,
-}
+pub struct Host(());
 
 impl Host {
     /// This program itself, even when its file has been replaced meanwhile. None: the system does not say where it is.
     pub fn this_program() -> Option<Self> {
-        let own = PathBuf::from("/proc/self/exe");
-        own.exists().then_some(Self { program: own })
+        own_command(HOST_NAME).map(|_| Self(()))
     }
 
     /// The command that starts a plugin under it; `folder` is that of the exchange.
     pub(super) fn command(&self, launch: &Launch, folder: &Path) -> Command {
-        let mut command = Command::new(&self.program);
+        let mut command = own_command(HOST_NAME).unwrap_or_else(|| Command::new(HOST_NAME));
         command
-            .arg0("plugin-host")
             .arg(HOST)
             .arg(std::process::id().to_string())
             .arg(folder)
@@ -65,8 +65,8 @@ impl Host {
 
 /// What `main` of a program does first: if it was started to host a plugin it does that, and the exit code is returned.
 /// Otherwise nothing.
-pub fn host_main() -> Option<ExitCode> {
-    let mut arguments = std::env::args_os().skip(1);
+pub fn host_main() -> Option<u8> {
+    let mut arguments = own_arguments();
     let what = arguments.next()?;
     let (is_host, is_start) = (what == OsStr::new(HOST), what == OsStr::new(START));
     if !is_host && !is_start {
@@ -82,18 +82,18 @@ pub fn host_main() -> Option<ExitCode> {
             let confined = how == OsStr::new(CONFINED);
             start(parent, confined.then_some(Path::new(folder)), program, arguments)
         }
-        _ => ExitCode::from(2),
+        _ => 2,
     })
 }
 
-fn host(parent: Pid, folder: &Path, command: &[OsString]) -> ExitCode {
+fn host(parent: Pid, folder: &Path, command: &[OsString]) -> u8 {
     // where the system refuses, what leaves the plugin's group and outlives its parent is not found
     let _ = set_child_subreaper(Some(getpid()));
     let program = Program { parent, held: pidfd_open(parent, PidfdFlags::empty()).ok() };
     if !program.has_ended(Duration::ZERO) {
         let own = getpid().as_raw_nonzero().to_string();
-        match Command::new("/proc/self/exe").arg0("plugin-start").arg(START).arg(own).arg(folder).args(command).spawn()
-        {
+        let mut start = own_command("plugin-start").unwrap_or_else(|| Command::new(HOST_NAME));
+        match start.arg(START).arg(own).arg(folder).args(command).spawn() {
             Ok(child) => {
                 let plugin = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
                 return hosted(plugin, program, folder);
@@ -101,10 +101,10 @@ fn host(parent: Pid, folder: &Path, command: &[OsString]) -> ExitCode {
             Err(error) => report_not_started(command.get(1), &error),
         }
     }
-    ExitCode::from(127)
+    127
 }
 
-fn hosted(plugin: Option<Pid>, program: Program, folder: &Path) -> ExitCode {
+fn hosted(plugin: Option<Pid>, program: Program, folder: &Path) -> u8 {
     // the plugin alone holds the pipes: their ends are seen when it ends or closes them
     if let Ok(nothing) = File::options().read(true).write(true).open("/dev/null") {
         let _ = rustix::stdio::dup2_stdin(&nothing);
@@ -144,16 +144,16 @@ fn reaped(plugin: Option<Pid>) -> Option<WaitStatus> {
 }
 
 /// Ends as the plugin did, for the process that waits.
-fn ended_as(status: Option<WaitStatus>) -> ExitCode {
-    let Some(status) = status else { return ExitCode::FAILURE };
+fn ended_as(status: Option<WaitStatus>) -> u8 {
+    let Some(status) = status else { return 1 };
     if let Some(signal) = status.terminating_signal() {
         // a signal that ended the plugin ends this process too, or is caught by its runtime
         if let Some(signal) = Signal::from_named_raw(signal) {
             let _ = kill_process(getpid(), signal);
         }
-        return ExitCode::from(u8::try_from(128 + signal).unwrap_or(1));
+        return u8::try_from(128 + signal).unwrap_or(1);
     }
-    ExitCode::from(status.exit_status().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+    status.exit_status().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
 
 /// The program that has started this host.
@@ -191,7 +191,7 @@ fn remove(folder: &Path) {
 }
 
 /// Becomes the plugin, which may write to `confined` alone if there is such a folder.
-fn start(host: Pid, confined: Option<&Path>, program: &OsStr, arguments: &[OsString]) -> ExitCode {
+fn start(host: Pid, confined: Option<&Path>, program: &OsStr, arguments: &[OsString]) -> u8 {
     // it stays with what this process becomes; where the system refuses, the host's own end is not seen
     let _ = set_parent_process_death_signal(Some(Signal::KILL));
     if getppid() == Some(host) {
@@ -200,12 +200,12 @@ fn start(host: Pid, confined: Option<&Path>, program: &OsStr, arguments: &[OsStr
                 Some(&program.to_owned()),
                 &format!("it cannot be confined ({error}): see `confined` in docs/plugins.md"),
             );
-            return ExitCode::from(127);
+            return 127;
         }
         let error = Command::new(program).args(arguments).exec();
         report_not_started(Some(&program.to_owned()), &error);
     }
-    ExitCode::from(127)
+    127
 }
 
 /// On stderr, which the program shows.

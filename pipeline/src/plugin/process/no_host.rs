@@ -1,7 +1,7 @@
 //! Where no process can be made the parent of what others leave behind: plugins run in a process group, and no more.
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
 use rustix::process::Pid;
 
@@ -23,7 +23,7 @@ impl Host {
 }
 
 /// Nothing on this system.
-pub fn host_main() -> Option<ExitCode> {
+pub fn host_main() -> Option<u8> {
     None
 }
 
