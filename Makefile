@@ -1,5 +1,5 @@
 # The two commands: `make demo` runs the main job, `make test` runs the tests.
-.PHONY: deps test-deps demo test accuracy test-interop test-slurm lint book fuzz deny sbom
+.PHONY: deps test-deps demo test accuracy test-interop test-slurm wheel test-wheel lint book fuzz deny sbom
 
 CMAKE_VERSION = 3.31.6
 MDBOOK_VERSION = 0.5.4
@@ -47,6 +47,17 @@ test-slurm: deps .tools/snakemake/installed
 	cargo test --workspace --locked --test commands --no-run
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
+
+# The Python package as a wheel with HDF5 inside, in dist/: for every Python from 3.10 on, on this system.
+wheel: deps .tools/wheel/installed
+	.tools/wheel/bin/maturin build --release --locked --manifest-path python/afmid/native/Cargo.toml --out dist
+
+# The same from the artifacts of the tests (no release build), installed into an empty environment without compiler or
+# cargo and tested there.
+test-wheel: deps .tools/wheel/installed
+	rm -rf target/wheels
+	.tools/wheel/bin/maturin build --profile dev --locked --manifest-path python/afmid/native/Cargo.toml --out target/wheels
+	tests/wheel/wheel.sh target/wheels/afmid-*.whl python3
 
 lint: deps
 	cargo fmt --all --check
@@ -102,6 +113,11 @@ sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
 .tools/readers: tests/requirements.txt | .tools/bin/cmake
 	.tools/bin/python -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
 	touch .tools/readers
+
+.tools/wheel/installed: tests/wheel/requirements.txt
+	python3 -m venv .tools/wheel
+	.tools/wheel/bin/python -m pip install --quiet --disable-pip-version-check -r tests/wheel/requirements.txt
+	touch $@
 
 # Apart from the readers: its dependencies are many.
 .tools/snakemake/installed: tests/interop.txt

@@ -1,6 +1,7 @@
 //! The built-in stages of afmid, by domain: parameters, ports, calls of kernels.
 
 mod artifacts;
+pub mod at_hand;
 pub mod calibration;
 pub mod causes;
 pub mod diagnosis;

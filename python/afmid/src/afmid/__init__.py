@@ -1,34 +1,107 @@
-"""Reads the result files of afmid.
+"""Identifies dynamic systems from recorded transients, with an error for every number.
 
->>> import afmid
->>> with afmid.open("a.h5") as r:
-...     modes = r.modes                         # pandas, with standard errors
-...     transfer = r.etfe.transfer              # xarray, complex, over frequency_hz
-...     model = r.model("model")                # A, B, C, D, K, covariance
->>> band = model.frequency_response()           # with its 95 % interval
->>> system = model.to_control()                 # or to_scipy()
+>>> import numpy as np, afmid
+>>> time = np.arange(4000) / 1e4
+>>> noise = 1e-3 * np.random.default_rng(1).standard_normal(4000)
+>>> y = np.exp(-12 * time) * np.cos(2 * np.pi * 250 * time) + noise
+>>> decay = afmid.ringdown(y, sample_rate_hz=1e4)
+>>> decay.modes.frequency_hz.round(1).tolist()
+[250.0]
+
+Results of the program (`afmid run CONFIG -o a.h5`) are opened by `afmid.open`.
 """
 
-from .errors import AfmidError, Damaged, NoCovariance, NotAResult, OtherFormat, UnknownName
-from .model import Model
-from .recording import Recording
-from .response import frequency_response
-from .result import Result, open
-from .stage import Source, Stage
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .decays import Ringdown, ringdown
+    from .diagnoses import Diagnosis, diagnose
+    from .errors import (
+        AfmidError,
+        AfmidWarning,
+        ConfigError,
+        Damaged,
+        DataError,
+        NoCovariance,
+        NotAResult,
+        OtherFormat,
+        UnknownName,
+    )
+    from .identification import IdentifiedModel, pem
+    from .model import Model
+    from .reading import inspect, read
+    from .recording import Recording
+    from .response import frequency_response
+    from .result import Result, open
+    from .running import run
+    from .stage import Source, Stage
 
 __version__ = "0.2.0"
+
+_PLACES = {
+    "decays": ("Ringdown", "ringdown"),
+    "diagnoses": ("Diagnosis", "diagnose"),
+    "errors": (
+        "AfmidError",
+        "AfmidWarning",
+        "ConfigError",
+        "Damaged",
+        "DataError",
+        "NoCovariance",
+        "NotAResult",
+        "OtherFormat",
+        "UnknownName",
+    ),
+    "identification": ("IdentifiedModel", "pem"),
+    "model": ("Model",),
+    "reading": ("inspect", "read"),
+    "recording": ("Recording",),
+    "response": ("frequency_response",),
+    "result": ("Result", "open"),
+    "running": ("run",),
+    "stage": ("Source", "Stage"),
+}
+# NumPy, pandas, xarray and h5py take half a second: each is imported with the first name that needs it
+_MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [
     "AfmidError",
+    "AfmidWarning",
+    "ConfigError",
     "Damaged",
+    "DataError",
+    "Diagnosis",
+    "IdentifiedModel",
     "Model",
     "NoCovariance",
     "NotAResult",
     "OtherFormat",
     "Recording",
     "Result",
+    "Ringdown",
     "Source",
     "Stage",
     "UnknownName",
+    "diagnose",
     "frequency_response",
+    "inspect",
     "open",
+    "pem",
+    "read",
+    "ringdown",
+    "run",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'afmid' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -67,3 +67,37 @@ class UnknownName(AfmidError, KeyError, AttributeError):
     def __str__(self) -> str:
         # KeyError shows its argument in quotes
         return str(self.args[0])
+
+
+class AfmidWarning(UserWarning):
+    """What a fit found that is not alright; the same words as the program's.
+
+    >>> issubclass(AfmidWarning, UserWarning)
+    True
+    """
+
+
+class DataError(AfmidError, ValueError):
+    """Data that cannot be used: what was found, where, what to do.
+
+    >>> raise DataError("sample 3 is missing", "a.csv", "cut the file")
+    Traceback (most recent call last):
+    afmid.errors.DataError: a.csv: sample 3 is missing; cut the file
+    """
+
+    def __init__(self, problem: str, file: str | None = None, help: str | None = None) -> None:
+        super().__init__(problem, file, help)
+        self.problem, self.file, self.help = problem, file, help
+
+    def __str__(self) -> str:
+        place = f"{self.file}: " if self.file else ""
+        return f"{place}{self.problem}" + (f"; {self.help}" if self.help else "")
+
+
+class ConfigError(DataError):
+    """A parameter that is wrong.
+
+    >>> raise ConfigError("`max_modes`: invalid type")
+    Traceback (most recent call last):
+    afmid.errors.ConfigError: `max_modes`: invalid type
+    """

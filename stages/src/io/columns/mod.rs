@@ -1,5 +1,6 @@
 //! Measured input and output from the channels of one file.
 
+mod at_hand;
 mod example;
 mod part;
 mod selection;
@@ -9,6 +10,7 @@ mod stretch;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use at_hand::columns_at_hand;
 pub use selection::Column;
 pub use stage::Columns;
 pub use stretch::{Removal, Stretch, Trend, halves};

@@ -8,6 +8,7 @@ use afmid_pipeline::recording::{
 
 use super::selection::Column;
 use super::stage::Columns;
+use crate::at_hand::Named;
 use crate::io::repeats::{same_values, varies};
 
 /// Inputs and outputs of one file in their units, NaN where missing.
@@ -58,20 +59,8 @@ impl Part {
                 )));
             }
         }
-        for (channel, input) in channels.inputs.iter().zip(&inputs) {
-            let name = &channel.location;
-            if let Some(k) = input.iter().position(|value| !value.is_finite()) {
-                return Err(StageError::new(format!(
-                    "input {name} misses sample {k}: the response to an unknown input is unknown"
-                ))
-                .help("choose stretches without gaps in the input and cut the file to them"));
-            }
-        }
-        for (channel, output) in channels.outputs.iter().zip(&outputs) {
-            if output.iter().all(|value| !value.is_finite()) {
-                return Err(StageError::new(format!("output {} has no value at all", channel.location)));
-            }
-        }
+        let located = |all: &[FoundChannel]| all.iter().map(|channel| channel.location.clone()).collect::<Vec<_>>();
+        complete(&inputs, &located(&channels.inputs), &outputs, &located(&channels.outputs))?;
         Ok(Self {
             input_unit: unit(&channels.inputs, wanted.input_unit.as_deref(), wanted.input_scale, "input")?,
             output_unit: unit(&channels.outputs, wanted.output_unit.as_deref(), wanted.output_scale, "output")?,
@@ -84,6 +73,37 @@ impl Part {
             inputs,
             outputs,
             samples,
+        })
+    }
+
+    /// Series at hand, all of one length. Errors: they are not; as those of a file.
+    pub fn at_hand(
+        inputs: Vec<Vec<f64>>,
+        outputs: Vec<Vec<f64>>,
+        [input_names, output_names]: [&[Named]; 2],
+        rate: f64,
+    ) -> Result<Self, StageError> {
+        let names = |all: &[Named]| all.iter().map(|named| named.name.clone()).collect::<Vec<_>>();
+        let unit = |all: &[Named]| all.first().map_or(String::new(), |first| first.unit.clone());
+        let samples = outputs.first().map_or(0, Vec::len);
+        let named = input_names.iter().chain(output_names).zip(inputs.iter().chain(&outputs));
+        if let Some((other, values)) = named.clone().find(|(_, values)| values.len() != samples) {
+            let problem = format!("{} has {} samples, the first output {samples}", other.name, values.len());
+            return Err(StageError::new(problem));
+        }
+        complete(&inputs, &names(input_names), &outputs, &names(output_names))?;
+        Ok(Self {
+            samples,
+            input_unit: unit(input_names),
+            output_unit: unit(output_names),
+            input_names: names(input_names),
+            output_names: names(output_names),
+            rate,
+            rate_relative_std: 0.0,
+            remarks: Vec::new(),
+            gaps: Vec::new(),
+            inputs,
+            outputs,
         })
     }
 
@@ -113,6 +133,27 @@ impl Part {
             true => Ok(self),
             false => differ("the output's unit", &self.output_unit, &first.output_unit),
         }
+    }
+}
+
+/// Errors: a sample of an input is missing, or all of an output.
+fn complete(
+    inputs: &[Vec<f64>],
+    input_names: &[String],
+    outputs: &[Vec<f64>],
+    output_names: &[String],
+) -> Result<(), StageError> {
+    for (name, input) in input_names.iter().zip(inputs) {
+        if let Some(k) = input.iter().position(|value| !value.is_finite()) {
+            return Err(StageError::new(format!(
+                "input {name} misses sample {k}: the response to an unknown input is unknown"
+            ))
+            .help("choose stretches without gaps in the input and cut the file to them"));
+        }
+    }
+    match output_names.iter().zip(outputs).find(|(_, output)| output.iter().all(|value| !value.is_finite())) {
+        Some((name, _)) => Err(StageError::new(format!("output {name} has no value at all"))),
+        None => Ok(()),
     }
 }
 

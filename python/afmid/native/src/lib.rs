@@ -1,0 +1,32 @@
+//! `afmid._native`: what the Python package computes with. Stages on arrays at hand, readers of recordings, the program.
+//!
+//! Artifacts go from stage to stage as they are; the classes that people see are Python's.
+
+mod artifact;
+mod at_hand;
+mod content;
+mod errors;
+mod inspect;
+mod program;
+mod read;
+mod stage;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// See the crate.
+#[pymodule(name = "_native")]
+mod native {
+    #[pymodule_export]
+    use crate::artifact::Artifact;
+    #[pymodule_export]
+    use crate::at_hand::{decays, pair, recording};
+    #[pymodule_export]
+    use crate::inspect::inspect;
+    #[pymodule_export]
+    use crate::program::main;
+    #[pymodule_export]
+    use crate::read::read;
+    #[pymodule_export]
+    use crate::stage::{run_stage, stage_parameters, stages_of};
+}

@@ -1,0 +1,72 @@
+//! Stages by themselves.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use afmid_pipeline::stage::NoProgress;
+use afmid_pipeline::{Context, Entry, Ports, toml};
+use pyo3::prelude::*;
+
+use crate::artifact::Artifact;
+use crate::errors;
+use crate::watch::watched;
+
+/// The stage of this name. Errors: there is none.
+fn entry(name: &str) -> PyResult<Entry> {
+    let registry = afmid::registry().map_err(errors::config)?;
+    registry.find(name).copied().ok_or_else(|| errors::config(format!("there is no stage `{name}`")))
+}
+
+/// Runs a stage with parameters (JSON; what is not stated has its default) on artifacts by port; returns its artifacts by
+/// port, and its warnings. `base`: the folder of relative paths. Without the interpreter's lock; Ctrl-C ends it.
+///
+/// Errors: a parameter that is wrong; as the stage.
+#[pyfunction]
+#[pyo3(signature = (name, inputs, params, seed = 1, base = "."))]
+pub fn run_stage(
+    py: Python<'_>,
+    name: &str,
+    inputs: BTreeMap<String, Py<Artifact>>,
+    params: &str,
+    seed: u64,
+    base: &str,
+) -> PyResult<(Vec<(String, Artifact)>, Vec<String>)> {
+    let params: toml::Table = serde_json::from_str(params).map_err(errors::config)?;
+    let stage = entry(name)?.parse(params).map_err(|error| {
+        let place = if matches!(error.path.as_str(), "" | ".") { String::new() } else { format!("`{}`: ", error.path) };
+        errors::config(format!("{place}{}", error.message))
+    })?;
+    if let Some(fault) = stage.faults().into_iter().next() {
+        return Err(errors::config(fault.problem));
+    }
+    let mut ports = Ports::new();
+    for (port, artifact) in &inputs {
+        ports.insert(port, artifact.get().0.clone());
+    }
+    let (outputs, warnings) = watched(py, |cancel| {
+        let cx = Context::new(Path::new(base), seed, &NoProgress).with_cancel(cancel);
+        let outputs = stage.run(&ports, &cx)?;
+        Ok((outputs, cx.into_warnings()))
+    })?;
+    let outputs = outputs.iter().map(|(port, artifact)| (port.to_owned(), Artifact(artifact.clone()))).collect();
+    Ok((outputs, warnings))
+}
+
+/// All parameters of a stage with their defaults, as JSON. Errors: there is no such stage.
+#[pyfunction]
+pub fn stage_parameters(name: &str) -> PyResult<String> {
+    let stage = entry(name)?.parse(toml::Table::new()).map_err(|error| errors::config(error.message))?;
+    Ok(stage.params().map_err(errors::stage)?.to_string())
+}
+
+/// Id and name of each stage of a config. Errors: it is no TOML; a stage without id or name.
+#[pyfunction]
+pub fn stages_of(config: &str) -> PyResult<Vec<(String, String)>> {
+    let config: toml::Table = toml::from_str(config).map_err(errors::config)?;
+    let stages = config.get("stage").and_then(toml::Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let text = |stage: &toml::Value, key: &str| {
+        let found = stage.get(key).and_then(toml::Value::as_str);
+        found.map(str::to_owned).ok_or_else(|| errors::config(format!("a stage has no `{key}`")))
+    };
+    stages.iter().map(|stage| Ok((text(stage, "id")?, text(stage, "uses")?))).collect()
+}

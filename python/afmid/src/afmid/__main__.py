@@ -1,0 +1,5 @@
+"""`python -m afmid`: the program."""
+
+from ._program import main
+
+main()

@@ -1,0 +1,20 @@
+"""The command line in the interpreter's process."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+
+def main() -> None:
+    """Runs the program with the arguments of the process and ends with its exit code.
+
+    Signals do what they do to a program: the interpreter's own handlers are taken off first.
+    """
+    from . import _native
+
+    for number in (signal.SIGINT, signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else (signal.SIGINT,):
+        # what was ignored when the process began (nohup) stays ignored; Python itself ignores SIGPIPE, as Rust does
+        if number != getattr(signal, "SIGPIPE", None) and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    sys.exit(_native.main(len(sys.argv) - 1))

@@ -1,0 +1,186 @@
+"""Modes from free decays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import xarray as xr
+
+from . import _native, artifacts
+from .arrays_at_hand import names, rate, records
+from .errors import DataError
+from .numbers import html_table, text_table, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ringdown:
+    """Modes of free decays, as `afmid.ringdown` returns them."""
+
+    modes: pd.DataFrame
+    """A row per mode, ascending: `frequency_hz`, `frequency_std_hz`, `quality_factor`, `quality_factor_std`,
+    `damping_ratio`, `damping_ratio_std`, `lack_of_fit` (1: noise alone is left round the mode).
+    """
+    shapes: xr.Dataset
+    """Complex mode shapes over mode and channel with their errors, and the modal assurance criterion."""
+    hits: pd.DataFrame
+    """Amplitude and phase of each mode in each hit."""
+    course: pd.DataFrame
+    """Each mode in the first and in the last part of the decays: whether it moves with its amplitude."""
+    residuals: xr.Dataset
+    """The largest hit as measured, as fitted, and what is left, over channel and time."""
+    events: pd.DataFrame | None
+    """Where decays were found, and what was refused; None where they were given."""
+    warnings: tuple[str, ...]
+    """What is not alright, in the program's words."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Numbers of modes that were tried, exponentials that are no modes and why, noise of each channel, ..."""
+
+    def mac(self) -> pd.DataFrame:
+        """Modal assurance criterion between the shapes, 1 on the diagonal."""
+        found = self.shapes["mac"]
+        numbers = range(1, found.shape[0] + 1)
+        return pd.DataFrame(found.values, index=pd.Index(numbers, name="mode"), columns=list(numbers))
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for number, mode in enumerate(self.modes.itertuples(), 1):
+            damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
+            quality = with_error(mode.quality_factor, mode.quality_factor_std)
+            rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
+        return rows
+
+    def summary(self) -> str:
+        """The table of modes with standard errors in brackets, and what is not alright, as text."""
+        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        return html_table(HEADS, self._rows(), self.warnings)
+
+    def plot(self, figure: Figure | None = None) -> Figure:
+        """Measured, fitted and what is left of the largest hit, a row of axes per channel. Needs matplotlib."""
+        from .figures import decay
+
+        return decay(self.residuals, figure)
+
+
+def ringdown(
+    y: Any,
+    *,
+    sample_rate_hz: float,
+    axes: str | None = None,
+    channels: Sequence[str] | None = None,
+    units: str | Sequence[str] | None = None,
+    begin: str | int = "auto",
+    modes: str | int = "auto",
+    max_modes: int = 12,
+    noise: str = "estimated",
+    part: str = "auto",
+    drift: bool = True,
+    false_alarm: float = 1e-3,
+    least_quality_factor: float = 0.5005,
+) -> Ringdown:
+    """Modes of free decays: frequencies, quality factors, shapes, each with its standard error.
+
+    The same numbers as the stages `events.decay` and `model.decay` of the program give for the same samples.
+
+    Parameters
+    ----------
+    y : array_like
+        (samples,), (hits, samples), (channels, samples) or (hits, channels, samples); a list where hits have unlike
+        lengths. NaN marks missing samples where `begin` is 0.
+    sample_rate_hz : float
+        Samples per second.
+    axes : {"hits", "channels"}, optional
+        What the first of two axes counts.
+    channels : sequence of str, optional
+        Names of the channels.
+    units : str or sequence of str, optional
+        Unit of all channels, or of each.
+    begin : "auto" or 0
+        "auto" finds the decays in each record: hits, releases, where they drown in the noise. 0 takes each record for
+        a decay from its first sample on.
+    modes : "auto" or int
+        How many; "auto" takes as many up to `max_modes` as the data show.
+    max_modes : int
+        Largest number that "auto" tries.
+    noise : {"estimated", "white"}
+        Noise beside the ringing: white and wander of each channel, or white alone.
+    part : {"auto", "whole"}
+        What counts of a mode that moves far while it dies away: its last part, or all.
+    drift : bool
+        Whether a linear drift of each record is estimated.
+    false_alarm : float
+        Probability that noise alone yields a further mode.
+    least_quality_factor : float
+        Least quality factor of an exponential.
+
+    Returns
+    -------
+    Ringdown
+
+    Raises
+    ------
+    DataError
+        Data that cannot be used: no decay, no oscillation above the noise, too few samples.
+    ConfigError
+        A parameter that is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, afmid
+    >>> time = np.arange(4000) / 1e4
+    >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(4000)
+    >>> decay = afmid.ringdown(np.exp(-12 * time) * np.cos(1571 * time) + noise, sample_rate_hz=1e4)
+    >>> mode = decay.modes.loc[0]
+    >>> bool(abs(mode.frequency_hz - 250.03) < 0.01), bool(abs(mode.quality_factor - 65.5) < 0.2)
+    (True, True)
+    """
+    found, _ = records(y, axes)
+    rate_hz = rate(sample_rate_hz)
+    named = names(channels, units, len(found[0]), "channel")
+    said: list[str] = []
+    events = None
+    if begin == "auto":
+        recording = _native.recording(found, named, rate_hz)
+        searched, said = artifacts.run_stage("events.decay", {"records": recording})
+        decays, events = searched["decays"], artifacts.table(searched["events"])
+    elif begin == 0:
+        decays = _native.decays(found, named, rate_hz)
+    else:
+        raise DataError(f'begin is {begin!r}, wanted "auto" or 0')
+    fitted, more = artifacts.run_stage(
+        "model.decay",
+        {"decays": decays},
+        modes=modes,
+        max_modes=max_modes,
+        noise=noise,
+        part=part,
+        drift=drift,
+        false_alarm=false_alarm,
+        least_quality_factor=least_quality_factor,
+    )
+    said = [*said, *more]
+    artifacts.warn(said)
+    shapes = artifacts.array(fitted["shapes"])
+    by_name = {"channel": shapes.attrs.pop("channels").split("\n")}
+    return Ringdown(
+        modes=artifacts.table(fitted["modes"]),
+        shapes=shapes.assign_coords(by_name),
+        hits=artifacts.table(fitted["hits"]),
+        course=artifacts.table(fitted["course"]),
+        residuals=artifacts.array(fitted["fit"]).assign_coords(by_name),
+        events=events,
+        warnings=tuple(said),
+        details=artifacts.document(fitted["summary"]),
+    )

@@ -1,0 +1,185 @@
+"""What a linear model gets wrong, and the cause."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from . import _native, artifacts
+from .arrays_at_hand import names, rate, real, records
+from .errors import DataError
+from .numbers import html_table, text_table, with_error
+
+HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis:
+    """What a linear model gets wrong, as `afmid.diagnose` returns it."""
+
+    verdict: str
+    """`clean`, `named` or `unexplained`."""
+    causes: pd.DataFrame
+    """A row per cause that was named: `id`, `class`, `p_value`, `next_measurement`."""
+    parameters: pd.DataFrame
+    """A row per parameter of each cause: `cause`, `parameter`, `value`, `std`, `unit`."""
+    gains: pd.DataFrame
+    """A row per cause: rms of the errors on data that did not choose it, `rms_before` and `rms_after`, and which."""
+    ladder: pd.DataFrame
+    """Models, each with one more cause."""
+    simulation: xr.Dataset
+    """Measured, and simulated before and after the extension."""
+    errors: xr.Dataset
+    """Errors by frequency and by the output's size."""
+    warnings: tuple[str, ...]
+    """What is not alright, in the program's words."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for parameter in self.parameters.itertuples():
+            gain = self.gains[self.gains.cause == parameter.cause]
+            before, after = (f"{gain[name].iloc[0]:.4g}" if len(gain) else "-" for name in ("rms_before", "rms_after"))
+            value = with_error(float(parameter.value), float(parameter.std))
+            rows.append([str(parameter.cause), str(parameter.parameter), value, str(parameter.unit), before, after])
+        return rows
+
+    def summary(self) -> str:
+        """Verdict, causes with their parameters and gains, and what is not alright, as text."""
+        said = [f"warning: {text}" for text in self.warnings]
+        table = [text_table(HEADS, self._rows())] if len(self.parameters) else []
+        return "\n".join([self.verdict, *table, *said])
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self.verdict}</p>" + html_table(HEADS, self._rows(), self.warnings)
+
+
+def diagnose(
+    y: Any,
+    u: Any = None,
+    *,
+    sample_rate_hz: float,
+    axes: str | None = None,
+    begin: str | int = "auto",
+    remove: str = "mean",
+    input_unit: str = "",
+    output_unit: str = "",
+    candidates: Sequence[str] = (),
+    without: Sequence[str] = (),
+    most_causes: int = 8,
+    false_alarm_rate: float = 0.01,
+    senses: str | None = None,
+) -> Diagnosis:
+    """Says what a linear model gets wrong in free decays, or in a measured input and output; names the causes, extends
+    the model, measures the gain.
+
+    The same answer as the stage `diagnosis.causes` of the program gives for the same samples.
+
+    Parameters
+    ----------
+    y : array_like
+        Output, (samples,); without `u` free decays, in the shapes of `afmid.ringdown`.
+    u : array_like, optional
+        Input, (samples,).
+    sample_rate_hz : float
+        Samples per second.
+    axes, begin
+        As for `afmid.ringdown`, of free decays.
+    remove : {"mean", "line", "none"}
+        What is taken off input and output before.
+    input_unit, output_unit : str
+        Units of input and output; that of the output says what it senses of the motion.
+    candidates : sequence of str
+        Ids of the causes that are tried (`afmid causes` lists them); empty: all that the data can show.
+    without : sequence of str
+        Causes that are left out.
+    most_causes : int
+        Most causes.
+    false_alarm_rate : float
+        Rate of false alarms over all candidates together.
+    senses : {"deflection", "rate", "acceleration"}, optional
+        What the output senses of the motion, where its unit does not say it.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    DataError
+        Data that cannot be used.
+    ConfigError
+        A parameter that is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, afmid
+    >>> time = np.arange(6000) / 1e4
+    >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(6000)
+    >>> afmid.diagnose(np.exp(-12 * time) * np.cos(1571 * time) + noise, sample_rate_hz=1e4, begin=0).verdict
+    'clean'
+    """
+    rate_hz = rate(sample_rate_hz)
+    said: list[str] = []
+    inputs: dict[str, Any] = {}
+    if u is None:
+        found, _ = records(y, axes)
+        named = names(None, output_unit, len(found[0]), "channel")
+        if begin == "auto":
+            searched, said = artifacts.run_stage("events.decay", {"records": _native.recording(found, named, rate_hz)})
+            inputs["decays"] = searched["decays"]
+        elif begin == 0:
+            inputs["decays"] = _native.decays(found, named, rate_hz)
+        else:
+            raise DataError(f'begin is {begin!r}, wanted "auto" or 0')
+    else:
+        inputs_given = np.atleast_2d(real(u, "u"))
+        inputs["pair"], said = _native.pair(
+            list(inputs_given),
+            [real(y, "y")],
+            names(None, input_unit, len(inputs_given), "input"),
+            names(None, output_unit, 1, "output"),
+            rate_hz,
+            json.dumps({"remove": remove}),
+        )
+    made, more = artifacts.run_stage(
+        "diagnosis.causes",
+        inputs,
+        candidates=list(candidates),
+        without=list(without),
+        most_causes=most_causes,
+        false_alarm_rate=false_alarm_rate,
+        senses=senses,
+    )
+    said = [*said, *more]
+    artifacts.warn(said)
+    answer = artifacts.document(made["summary"])
+    causes = answer["causes"]
+    parameters = [
+        {"cause": cause["id"], "parameter": name, "value": of["value"], "std": of.get("std"), "unit": of.get("unit", "")}
+        for cause in causes
+        for name, of in cause["parameters"].items()
+    ]
+    gains = [{"cause": cause["id"], **cause["gain"]} for cause in causes]
+    columns = ["id", "class", "p_value", "next_measurement"]
+    return Diagnosis(
+        verdict=answer["verdict"],
+        causes=pd.DataFrame([{name: cause.get(name) for name in columns} for cause in causes], columns=columns),
+        parameters=pd.DataFrame(parameters, columns=["cause", "parameter", "value", "std", "unit"]),
+        gains=pd.DataFrame(gains, columns=["cause", "rms_before", "rms_after", "unit", "held_out"]),
+        ladder=artifacts.table(made["ladder"]),
+        simulation=artifacts.array(made["simulation"]),
+        errors=artifacts.array(made["errors"]),
+        warnings=tuple(said),
+        details=answer,
+    )

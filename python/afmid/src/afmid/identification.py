@@ -1,0 +1,191 @@
+"""Models from measured input and output."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from . import _native, artifacts
+from .arrays_at_hand import names, rate, real
+from .errors import DataError
+from .model import Model
+from .numbers import html_table, text_table, with_error
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentifiedModel(Model):
+    """A model with its modes, as `afmid.pem` returns it."""
+
+    modes: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """A row per resonance, ascending, with standard errors."""
+    roots: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """All poles and zeros, and what each is."""
+    residuals: xr.Dataset = field(default_factory=xr.Dataset)
+    """Prediction errors and predictions over time."""
+    warnings: tuple[str, ...] = ()
+    """What is not alright, in the program's words."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Convergence, orders that were tried, fits of the data, tests of the residual."""
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for number, mode in enumerate(self.modes.itertuples(), 1):
+            damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
+            quality = with_error(mode.quality_factor, mode.quality_factor_std)
+            rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
+        return rows
+
+    def summary(self) -> str:
+        """Order, fit and the table of modes with standard errors in brackets, and what is not alright, as text."""
+        fit = self.details.get("simulation_fit_percent")
+        head = f"order {self.order}" + (f", simulation fits {fit:.2f} % of the data" if fit is not None else "")
+        table = text_table(HEADS, self._rows()) if len(self.modes) else "no modes: nothing oscillates"
+        return "\n".join([head, table, *(f"warning: {text}" for text in self.warnings)])
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        return f"<p>order {self.order}</p>" + html_table(HEADS, self._rows(), self.warnings)
+
+    def bode(self, frequency_hz: Any = None, figure: Figure | None = None) -> Figure:
+        """Magnitude and phase with their 95 % bands, from the first input. Needs matplotlib."""
+        from .figures import bode
+
+        return bode(self.frequency_response(frequency_hz), figure)
+
+
+def pem(
+    u: Any,
+    y: Any,
+    *,
+    sample_rate_hz: float,
+    order: str | int = "auto",
+    max_order: int = 12,
+    noise: str = "coloured",
+    focus: str = "prediction",
+    starts: int = 8,
+    block_rows: int = 20,
+    prior: float = 0.0,
+    offset: bool = True,
+    drift: bool = False,
+    max_iterations: int = 60,
+    remove: str = "mean",
+    inputs: Sequence[str] | None = None,
+    output: str | None = None,
+    input_unit: str = "",
+    output_unit: str = "",
+) -> IdentifiedModel:
+    """A state-space model in innovations form from measured input and output, by the prediction error method.
+
+    `x(t + Ts) = A x + B u + K e`, `y = C x + D u + e + offset`. The same numbers as the stages `model.pem` and
+    `model.modes` of the program give for the same samples.
+
+    Parameters
+    ----------
+    u : array_like
+        Input, (samples,), or inputs, (inputs, samples).
+    y : array_like
+        Output, (samples,); NaN marks missing samples, which want `noise="white"`.
+    sample_rate_hz : float
+        Samples per second.
+    order : "auto" or int
+        Number of states; "auto" takes the smallest up to `max_order` whose simulation of the last third, fitted on the
+        rest, is within a standard error of the best.
+    max_order : int
+        Largest order that "auto" tries.
+    noise : {"coloured", "thermal", "free", "white"}
+        How errors are whitened: by an autoregressive filter of their own; through the model's poles, one intensity
+        each; through a free Kalman gain; not at all (output error).
+    focus : {"prediction", "simulation"}
+        Which errors are made small.
+    starts : int
+        Starts that are refined.
+    block_rows : int
+        Rows of the Hankel matrix that the starts come from, more than the order.
+    prior : float
+        Prior variance of the response outside the excited band.
+    offset, drift : bool
+        Whether an offset and a linear drift of the output are estimated.
+    max_iterations : int
+        Most iterations in each stretch of the search.
+    remove : {"mean", "line", "none"}
+        What is taken off input and output before, by the constants of the first half.
+    inputs, output : str, optional
+        Names of the channels.
+    input_unit, output_unit : str
+        Their units.
+
+    Returns
+    -------
+    IdentifiedModel
+
+    Raises
+    ------
+    DataError
+        Data that cannot be used: unlike lengths, too few samples, a constant output.
+    ConfigError
+        A parameter that is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, afmid
+    >>> rng = np.random.default_rng(1)
+    >>> u = rng.standard_normal(2000)
+    >>> y = np.zeros(2000)
+    >>> for k in range(2, 2000):
+    ...     y[k] = 1.6 * y[k - 1] - 0.9 * y[k - 2] + 0.3 * u[k - 1]
+    >>> model = afmid.pem(u, y + 0.01 * rng.standard_normal(2000), sample_rate_hz=1e3)
+    >>> model.order, model.modes.frequency_hz.round(1).tolist()
+    (2, [90.4])
+    """
+    inputs_given = np.atleast_2d(real(u, "u"))
+    output_given = real(y, "y")
+    if output_given.ndim != 1 or inputs_given.ndim != 2:
+        raise DataError(f"u has the shape {inputs_given.shape} and y {output_given.shape}, wanted (inputs, samples), (samples,)")
+    pair, said = _native.pair(
+        list(inputs_given),
+        [output_given],
+        names(inputs, input_unit, len(inputs_given), "input"),
+        names(None if output is None else [output], output_unit, 1, "output"),
+        rate(sample_rate_hz),
+        json.dumps({"remove": remove}),
+    )
+    fitted, more = artifacts.run_stage(
+        "model.pem",
+        {"pair": pair},
+        order=order,
+        max_order=max_order,
+        noise=noise,
+        focus=focus,
+        starts=starts,
+        block_rows=block_rows,
+        prior=prior,
+        offset=offset,
+        drift=drift,
+        max_iterations=max_iterations,
+    )
+    modes, of_modes = artifacts.run_stage("model.modes", {"model": fitted["model"]})
+    said = [*said, *more, *of_modes]
+    artifacts.warn(said)
+    content = fitted["model"].content()
+    content["parameter_names"] = tuple(content["parameter_names"])
+    return IdentifiedModel(
+        **content,
+        modes=artifacts.table(modes["modes"]),
+        roots=artifacts.table(modes["roots"]),
+        residuals=artifacts.array(fitted["residuals"]),
+        warnings=tuple(said),
+        details=artifacts.document(fitted["summary"]),
+    )

@@ -1,0 +1,51 @@
+"""Numbers with their standard errors, as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+
+
+def with_error(value: float, std: float) -> str:
+    """Value and standard error in brackets, two digits of it: `250.013(12)`; the value alone where none is known.
+
+    >>> with_error(250.0126, 0.0123), with_error(20.83, math.nan), with_error(1234567.0, 4300.0)
+    ('250.013(12)', '20.83', '1234600(4300)')
+    """
+    if not math.isfinite(value):
+        return "-"
+    if not (math.isfinite(std) and std > 0):
+        return f"{value:.6g}"
+    digits = 1 - math.floor(math.log10(std))
+    if digits <= 0:
+        unit = 10**-digits
+        return f"{round(value / unit) * unit:.0f}({round(std / unit) * unit:.0f})"
+    if digits > 12:
+        return f"{value:.9g} +- {std:.1e}"
+    error = round(std * 10**digits)
+    return f"{value:.{digits}f}({error})"
+
+
+def text_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Columns side by side, right-aligned.
+
+    >>> print(text_table(["a", "b"], [["1", "22"]]))
+    a   b
+    1  22
+    """
+    lines = [list(heads), *map(list, rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(heads))]
+    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines)
+
+
+def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], said: Iterable[str] = ()) -> str:
+    """The same for notebooks, with what there is to say under it.
+
+    >>> html_table(["a"], [["1"]], ["b < c"])
+    '<table><tr><th>a</th></tr><tr><td>1</td></tr></table><ul><li>b &lt; c</li></ul>'
+    """
+    line = lambda cells, kind: "<tr>" + "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in cells) + "</tr>"  # noqa: E731
+    below = "".join(f"<li>{escape(text)}</li>" for text in said)
+    table = "<table>" + line(heads, "th") + "".join(line(row, "td") for row in rows) + "</table>"
+    return table + (f"<ul>{below}</ul>" if below else "")

@@ -1,0 +1,92 @@
+"""Configs of the program, run from Python."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from .errors import ConfigError, DataError
+from .result import Result
+from .result import open as open_result
+
+_USAGE = 2
+"""The program's exit code for what cannot be run; 1 is for what failed."""
+
+
+def run(
+    config: str | os.PathLike[str],
+    *,
+    files: Sequence[str | os.PathLike[str]] | None = None,
+    set: Mapping[str, Any] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    cache: str | os.PathLike[str] | None = None,
+    progress: bool = False,
+) -> Result:
+    """Runs a config as `afmid run` does, in a process of its own, and opens its result.
+
+    Parameters
+    ----------
+    config : path
+        The config.
+    files : sequence of path, optional
+        Files of its loading stage, instead of those that it names.
+    set : mapping, optional
+        Other values of parameters: `{"model.order": 9}`.
+    output : path, optional
+        Where the result is written; a temporary file where it is not said.
+    cache : path, optional
+        The folder of the cache; the program's own by default.
+    progress : bool
+        Whether the program's progress and warnings are shown.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ConfigError
+        A config that cannot be run, in the program's words.
+    DataError
+        A stage that failed.
+
+    Examples
+    --------
+    >>> import afmid
+    >>> _ = open("a.toml", "w").write('[pipeline]\\nname = "a"\\n\\n[[stage]]\\nid = "data"\\nuses = "io.column"\\n')
+    >>> afmid.run("a.toml")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    afmid.errors.ConfigError: ...io.column...
+    """
+    place = Path(output) if output is not None else Path(tempfile.mkdtemp(prefix="afmid-")) / "result.h5"
+    values = dict(set or {})
+    if files is not None:
+        values[f"{_loading_stage(Path(config))}.files"] = [os.path.abspath(file) for file in files]
+    command = [sys.executable, "-m", "afmid", "run", os.fspath(config), "-o", os.fspath(place)]
+    for name, value in values.items():
+        command += ["--set", f"{name}={json.dumps(value)}"]
+    if cache is not None:
+        command += ["--cache", os.fspath(cache)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    if progress and done.stderr:
+        print(done.stderr, end="", file=sys.stderr)
+    if done.returncode != 0:
+        kind = ConfigError if done.returncode == _USAGE else DataError
+        raise kind(done.stderr.strip() or f"afmid run ended with {done.returncode}")
+    return open_result(place)
+
+
+def _loading_stage(config: Path) -> str:
+    """The id of the one stage that reads files. Errors: `ConfigError`, there is none, or there are several."""
+    stages = _native.stages_of(config.read_text(encoding="utf-8"))
+    ids = [name for name, uses in stages if uses in ("io.records", "io.columns", "io.frf")]
+    if len(ids) != 1:
+        raise ConfigError(f"{len(ids)} stages read files, wanted one", str(config), 'give set={"STAGE.files": [...]}')
+    return ids[0]

@@ -1,0 +1,62 @@
+"""The program that the package installs: exit codes, signals, plugins, start-up; and the readers."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import afmid
+import numpy as np
+import pytest
+
+PROGRAM = Path(sys.executable).with_name("afmid")
+
+
+def test_exit_codes_are_the_program_s():
+    run = lambda *arguments: subprocess.run([PROGRAM, *arguments], capture_output=True, text=True)  # noqa: E731
+    assert run("--version").stdout.startswith("afmid ")
+    assert run("stages").returncode == 0
+    assert run("no-such-command").returncode == 2
+    missing = run("run", "none.toml")
+    assert missing.returncode == 2 and "none.toml" in missing.stderr
+    module = subprocess.run([sys.executable, "-m", "afmid", "--version"], capture_output=True, text=True)
+    assert module.stdout == run("--version").stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals")
+def test_a_signal_ends_a_run_as_it_ends_the_program(tmp_path):
+    plugin = tmp_path / "wait.py"
+    plugin.write_text("import time\ntime.sleep(60)\n")
+    run = subprocess.Popen([PROGRAM, "plugin", "check", "--", sys.executable, str(plugin)], stderr=subprocess.PIPE)
+    time.sleep(1.5)
+    run.send_signal(signal.SIGINT)
+    run.communicate(timeout=30)
+    assert run.returncode in (130, 2)
+
+
+def test_a_recording_is_read_with_its_clock():
+    time_ms = np.arange(200) / 10
+    u = np.sin(time_ms)
+    Path("a.csv").write_text("t (ms);u (mV)\n" + "".join(f"{t:.1f};{v:.9f}\n" for t, v in zip(time_ms, u, strict=True)))
+    found = afmid.read("a.csv")
+    assert found["u"].attrs["units"] == "mV" and found["u"].attrs["sample_rate_hz"] == pytest.approx(1e4)
+    assert np.allclose(found["u"], u, atol=1e-9) and np.allclose(found.time, time_ms / 1e3)
+    assert afmid.inspect("a.csv") == json.loads(
+        subprocess.run([PROGRAM, "inspect", "a.csv", "--json"], capture_output=True, text=True, check=True).stdout
+    )
+    with pytest.raises(afmid.DataError, match=r"none\.csv"):
+        afmid.read("none.csv")
+
+
+def test_importing_is_quick_and_imports_no_other_package():
+    code = "import sys, afmid; print([n for n in ('numpy', 'pandas', 'xarray', 'h5py', 'matplotlib') if n in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_every_name_is_there_and_documented():
+    for name in afmid.__all__:
+        assert getattr(afmid, name).__doc__, name
+    with pytest.raises(AttributeError, match="no attribute"):
+        afmid.no_such_name  # noqa: B018

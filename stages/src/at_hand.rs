@@ -1,0 +1,72 @@
+//! Artifacts made of arrays at hand, for stages that are run by themselves, without a file.
+
+use std::sync::Arc;
+
+use afmid_pipeline::recording::Raw;
+use afmid_pipeline::{Array, Channel, Recording, StageError};
+
+use crate::artifacts::{Sensor, decay_array};
+use crate::io::{MemorySource, columns_at_hand, memory_record};
+
+/// A channel's name and unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// As people know it.
+    pub name: String,
+    /// Its unit; empty where it is not known.
+    pub unit: String,
+}
+
+/// What `io.records` hands on: records of as many samples in each of these channels. Errors: a record with another
+/// number of channels than names.
+pub fn recording(
+    records: Vec<Vec<Vec<f64>>>,
+    channels: &[Named],
+    sample_rate_hz: f64,
+) -> Result<Recording, StageError> {
+    let channel = |(named, values): (&Named, Vec<f64>)| Channel {
+        role: crate::artifacts::DEFLECTION.to_owned(),
+        location: named.name.clone(),
+        samples: values.len(),
+        unit: named.unit.clone(),
+        long_name: String::new(),
+        scale_factor: 1.0,
+        add_offset: 0.0,
+        fill_code: None,
+        source: Arc::new(MemorySource(Raw::Float64(values))),
+    };
+    let mut made = Vec::with_capacity(records.len());
+    for (number, record) in records.into_iter().enumerate() {
+        as_many(record.len(), channels)?;
+        let channels = channels.iter().zip(record).map(channel).collect();
+        made.push(memory_record(&format!("record {number}"), sample_rate_hz, channels));
+    }
+    Ok(Recording { records: made })
+}
+
+/// What `events.decay` hands on: free decays from their first sample on, NaN where one is missing. Errors: as
+/// [`recording`].
+pub fn decays(hits: &[Vec<Vec<f64>>], channels: &[Named], sample_rate_hz: f64) -> Result<Array, StageError> {
+    hits.iter().try_for_each(|hit| as_many(hit.len(), channels))?;
+    let sensor = |named: &Named| Sensor { name: named.name.clone(), unit: named.unit.clone() };
+    decay_array(hits, &[], &channels.iter().map(sensor).collect::<Vec<_>>(), sample_rate_hz)
+}
+
+/// What `io.columns` hands on for these inputs and outputs with these parameters of its own (`remove`, ...), and what it
+/// warns of. Errors: as that stage.
+pub fn pair(
+    inputs: Vec<Vec<f64>>,
+    outputs: Vec<Vec<f64>>,
+    names: [&[Named]; 2],
+    sample_rate_hz: f64,
+    params: serde_json::Value,
+) -> Result<(Array, Vec<String>), StageError> {
+    columns_at_hand(inputs, outputs, names, sample_rate_hz, params)
+}
+
+fn as_many(found: usize, channels: &[Named]) -> Result<(), StageError> {
+    match found == channels.len() {
+        true => Ok(()),
+        false => Err(StageError::new(format!("{found} channels, wanted {} as there are names", channels.len()))),
+    }
+}

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Usage: wheel.sh WHEEL PYTHON. Installs the wheel into an empty environment whose PATH holds Python alone, no compiler and no cargo; runs
+# what python/afmid/README.md shows there, the package's tests and its examples.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+wheel=$(realpath "$1")
+python=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+"$python" -m venv empty
+export PATH="$work/empty/bin"
+export PYTHONDONTWRITEBYTECODE=1
+for tool in cc gcc cargo rustc; do
+    if command -v "$tool"; then echo "$tool is still there"; exit 1; fi
+done
+python -m pip install --quiet --disable-pip-version-check "$wheel[plot,scipy,control]"
+echo "== the first lines of the README"
+python "$root/tests/wheel/readme_lines.py" "$root/python/afmid/README.md" ringdown pem read >lines.py
+python lines.py
+afmid --version
+echo "== tests and examples"
+python -m pip install --quiet --disable-pip-version-check pytest
+python -m pytest -q -p no:cacheprovider "$root/python/afmid/tests_native"
