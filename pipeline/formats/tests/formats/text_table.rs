@@ -431,5 +431,5 @@ fn a_stated_interval_and_the_times_must_agree() {
     assert_eq!(described(&coarse), [("a", "", Some(4000.0))], "{:?}", coarse.remarks);
     let wrong = table("wrong.csv", "Sample Interval,0.5\nTIME,a\n0.0,1\n0.1,2\n0.2,3\n");
     assert_eq!(described(&wrong), [("TIME", "", None), ("a", "", None)]);
-    assert!(remarked(&wrong, "no sample rate: TIME steps by 1e-1, the header says «Sample Interval 0.5»"));
+    assert!(remarked(&wrong, "no sample rate: TIME steps by 0.1, the header says «Sample Interval 0.5»"));
 }
