@@ -14,7 +14,7 @@ use crate::facts::{OF_ITS_LENGTH, TAKEN_AS_SECONDS};
 use crate::frequency::{hertz, perhaps_frequencies};
 use crate::guess::why_no_seconds;
 use crate::printed::Printed;
-use crate::rate::{AGREE, ONE_CLOCK, fewest_digits, of_step};
+use crate::rate::{AGREE, ONE_CLOCK, fewest_digits, of_step, unit_that_fits};
 use crate::time_units::{seconds, time_name};
 use crate::together::LEFT_SAMPLES;
 use crate::{Contents, FoundChannel};
@@ -118,7 +118,8 @@ pub fn settle(contents: &mut Contents) {
             *said = true;
         }
         if let (Some(stated), Some(clock)) = (stated_s, &axis.clock) {
-            starts.push((at, stated - clock.start_s, clock.step_s));
+            let times_s = channel.start_s.unwrap_or(clock.start_s);
+            starts.push((at, stated - times_s, clock.step_s));
         }
     }
     contradicted_starts(channels, &starts, remarks);
@@ -168,7 +169,10 @@ fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<S
         }
         return false;
     };
-    let step_s = clock.step_s;
+    // a rate that is stated proves the unit of times without one
+    let proven = channel.sample_rate_hz.filter(|_| clock.guessed);
+    let unit = proven.and_then(|rate| unit_that_fits(clock.step_s, rate.recip())).unwrap_or(1.0);
+    let step_s = clock.step_s * unit;
     let rate = fewest_digits(of_step(step_s), clock.uncertainty);
     let stated = channel.sample_rate_hz;
     let agree = AGREE.max(clock.uncertainty + channel.rate_relative_std);
@@ -182,7 +186,7 @@ fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<S
         (channel.rate_relative_std, channel.rate_is_guess) = (clock.relative_std, clock.guessed);
     }
     channel.sample_rate_hz = Some(stated.unwrap_or(rate));
-    channel.start_s = Some(clock.start_s);
+    channel.start_s = Some(clock.start_s * unit);
     if !clock.gaps.is_empty() {
         channel.gaps.extend(&clock.gaps);
         channel.gaps.sort_unstable();

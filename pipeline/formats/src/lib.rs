@@ -49,8 +49,8 @@ pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
 pub use number::Number;
 pub use rate::{
-    Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, agreed_start, brief_number, is_rate, rate_in,
-    rates_agree, start_in, unit_names,
+    Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, agreed_start, brief_number, is_rate, one_number,
+    rate_in, rates_agree, start_in, unit_names,
 };
 pub use raw::Raw;
 pub use readers::raw_binary::{RawBinary, SampleType};

@@ -5,8 +5,8 @@ use crate::grid::{Grid, Store};
 use crate::labels::Labels;
 use crate::lanes::Lanes;
 use crate::number::Number;
-use crate::rate::{Clue, is_unit_of_clue, rate_in, start_in, unit_names};
-use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts};
+use crate::rate::{Clue, is_unit_of_clue, one_number, rate_in, start_in, unit_names};
+use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -129,6 +129,11 @@ impl Listing {
             return self.remark(format!(
                 "{location} is left out: its {count} channels of {samples} samples are too many to list"
             ));
+        }
+        if let Some(value) = one_clue(array, &lanes) {
+            let (_, name) = scope_and_name(location);
+            self.clue(&array.scope, Clue::of(name, location, value));
+            return self.remark(format!("{location} {ONE_NUMBER} {value}, of several channels, and no channel"));
         }
         self.bytes += bytes;
         if lanes.wide {
@@ -258,6 +263,22 @@ impl Listing {
         self.labels.give(&mut channels);
         Contents { format, started_at: String::new(), channels, responses: self.responses, remarks: self.remarks }
     }
+}
+
+/// The number of an array that is named like a rate, if it holds one alone, once for each channel.
+fn one_clue(array: &Array, lanes: &Lanes) -> Option<f64> {
+    const MOST_NUMBERS: usize = 4096;
+    Clue::of(scope_and_name(&array.location).1, "", 1.0)?;
+    let count = lanes.count().saturating_mul(lanes.samples);
+    let all = Grid {
+        store: array.store.clone(),
+        first: array.first,
+        step: array.item_bytes,
+        samples: count,
+        number: array.number,
+        big_endian: array.big_endian,
+    };
+    (count <= MOST_NUMBERS).then(|| one_number(&all.read(0, count).ok()?.widened())).flatten()
 }
 
 /// `/s` and `fs` of `/s.fs`; the file (empty) and `fs` of `/fs`.

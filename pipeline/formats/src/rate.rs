@@ -208,6 +208,12 @@ pub(crate) fn shortest(step: f64) -> f64 {
     if f64::from(single) == step { single.to_string().parse().unwrap_or(step) } else { step }
 }
 
+/// The number that all of several are: of each channel the same rate.
+pub fn one_number(numbers: &[f64]) -> Option<f64> {
+    let first = *numbers.first()?;
+    numbers.iter().all(|number| *number == first).then_some(first)
+}
+
 /// A number that is named like a sampling rate, an interval or the instant of the first sample.
 #[derive(Debug, Clone)]
 pub struct Clue {

@@ -304,6 +304,47 @@ fn a_statement_without_a_unit_has_that_of_the_one_that_it_agrees_with() {
     assert_eq!(clock(&refused, "y").0, None, "{:?}", refused.remarks);
 }
 
+#[test]
+fn seconds_since_1970_in_four_digits_have_the_round_rate() {
+    for (rows, digits) in [(50, 4), (300, 4), (5000, 4), (300, 6)] {
+        let found =
+            table("Time (s),y", rows, |k| format!("{:.digits$},{:.4}", 1_622_690_466.0 + 1e-4 * k as f64, y(k)));
+        assert_eq!(clock(&found, "y").0, Some(1e4), "{rows} {digits} {:?}", found.remarks);
+    }
+    let times: Vec<f64> = (0..300).map(|k| 1_622_690_466.25 + 1e-4 * f64::from(k)).collect();
+    let found = structs(&[("A", vec![field("t", &times), field("y", &values(300))])]);
+    assert_eq!(clock(&found, "/A.y").0, Some(1e4), "{:?}", found.remarks);
+}
+
+#[test]
+fn what_is_stated_is_not_asked_for() {
+    let stroke = table("t/ms,a/V,b/g", 50, |k| format!("{:.1},{:.4},{:.4}", 0.1 * k as f64, y(k), y(k + 5)));
+    assert_eq!((clock(&stroke, "a").0, of(&stroke, "a").unit.as_str()), (Some(1e4), "V"), "{:?}", stroke.remarks);
+    let index = table("Increment,1e-4\nIndex,a (V)", 50, |k| format!("{k},{:.4}", y(k)));
+    assert_eq!(clock(&index, "a").0, Some(1e4), "{:?}", index.remarks);
+    assert_eq!(index.channels.len(), 1, "{:?}", index.channels);
+    let slow = table("# Sampling rate: 30 samples/min\na (V),b (V)", 50, |k| format!("{:.4},{:.4}", y(k), y(k + 5)));
+    assert_eq!(clock(&slow, "a").0, Some(0.5), "{:?}", slow.remarks);
+    let rates = |fields: Vec<(String, Vec<u8>)>| {
+        let found = structs(&[("A", [fields, vec![field("y", &values(50)), field("z", &values(50))]].concat())]);
+        (clock(&found, "/A.y").0, found.remarks)
+    };
+    let times: Vec<f64> = (0..50).map(|k| 0.1 * f64::from(k)).collect();
+    for fields in [
+        vec![text_field("fs", "10 kHz")],
+        vec![field("fs", &[1e4, 1e4])],
+        vec![field("dt", &[0.1]), text_field("dt_unit", "ms")],
+        vec![field("t", &times), text_field("t_unit", "1e-3 s")],
+        vec![field("t", &times), field("fs", &[1e4])],
+    ] {
+        let (rate, remarks) = rates(fields);
+        assert_eq!(rate, Some(1e4), "{remarks:?}");
+    }
+    assert_eq!(rates(vec![field("fs", &[1e4, 2e4])]).0, None);
+    let other = rates(vec![field("t", &times), field("fs", &[3e4])]);
+    assert!(other.0.is_none() && other.1.iter().any(|remark| remark.contains("no sample rate")), "{other:?}");
+}
+
 /// An NPZ archive of these members: name, type, number of elements if it is no single one, bytes.
 fn npz(members: &[(&str, &str, Option<usize>, Vec<u8>)]) -> Contents {
     let mut archive = ZipWriter::new(std::io::Cursor::new(Vec::new()));

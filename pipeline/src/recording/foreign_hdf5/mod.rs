@@ -79,7 +79,16 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
                 continue;
             }
-            Ok(Variable::Series(series)) => series,
+            Ok(Variable::Series(series)) => {
+                if let Some(value) = Scopes::one_number(&found) {
+                    scopes.number(&found, value, allowance);
+                    let location = &found.location;
+                    remarks
+                        .push(format!("{location} is the single number {value}, of several channels, and no channel"));
+                    continue;
+                }
+                series
+            }
             Err(why) => {
                 let texts = if matlab { labels::texts(&found, allowance) } else { Vec::new() };
                 if texts.is_empty() {

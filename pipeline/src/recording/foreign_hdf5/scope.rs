@@ -2,15 +2,17 @@
 
 use std::collections::{HashMap, HashSet};
 
-use afmid_formats::{Clue, agreed_rate, agreed_start, rate_in, start_in, unit_names};
+use afmid_formats::{Clue, agreed_rate, agreed_start, one_number, rate_in, start_in, unit_names};
 use hdf5::Location;
 
 use super::walk::Found;
 use crate::hdf5_files::read::{Allowance, attribute_names};
-use crate::recording::native::{has_attribute, number_attribute, text_attribute};
+use crate::recording::native::{has_attribute, number_attribute, numbers_attribute, text_attribute};
 
 /// More statements of a rate are ignored: a damaged file could make millions.
 const MOST_CLUES: usize = 4096;
+/// A rate that is stated once for each channel is stated at most so often.
+const MOST_NUMBERS: usize = 4096;
 
 /// Clues by the path of the group that they are about; empty for the file.
 #[derive(Debug, Default)]
@@ -58,6 +60,13 @@ impl Scopes {
         }
     }
 
+    /// The number that a small array is throughout, if it is named like a rate: that of several channels.
+    pub(super) fn one_number(found: &Found) -> Option<f64> {
+        Clue::of(&found.name, "", 1.0)?;
+        let size = found.dataset.size();
+        (1..=MOST_NUMBERS).contains(&size).then(|| one_number(&found.dataset.read_raw::<f64>().ok()?)).flatten()
+    }
+
     fn add(&mut self, scope: &str, clue: Clue) {
         if self.count < MOST_CLUES {
             self.count += 1;
@@ -100,8 +109,8 @@ fn clues(object: &Location, path: &str, allowance: &Allowance) -> Vec<Clue> {
         // only attributes that are named like a rate are read
         Clue::of(name, "", 0.0)?;
         let location = format!("{path}@{name}");
-        let clue = match number_attribute(object, path, name) {
-            Ok(value) => Clue::of(name, &location, value),
+        let clue = match numbers_attribute(object, path, name, MOST_NUMBERS) {
+            Ok(numbers) => Clue::of(name, &location, one_number(&numbers)?),
             Err(_) => Clue::of_text(name, &location, &text_attribute(object, name, allowance)?),
         };
         let unit = unit_names(name).into_iter().find_map(|name| text_attribute(object, &name, allowance));

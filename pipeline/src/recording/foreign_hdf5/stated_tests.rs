@@ -263,6 +263,17 @@ fn rates_and_starts_lie_in_attributes_of_a_dataset_or_its_group_and_in_numbers_b
         }
     });
     let clocks: Vec<_> = contents.channels.iter().map(|channel| (channel.sample_rate_hz, channel.start_s)).collect();
+    let several = opened("several-rates", |file| {
+        for (path, rates) in [("a", [1e4, 1e4]), ("b", [1e4, 2e4])] {
+            let group = file.create_group(path).unwrap();
+            group.new_dataset_builder().with_data(&rates).create("fs").unwrap();
+            group.new_dataset_builder().with_data(&line).create("y").unwrap();
+        }
+        let data = file.new_dataset_builder().with_data(&line).create("z").unwrap();
+        data.new_attr_builder().with_data(&[5e3, 5e3]).create("fs").unwrap();
+    });
+    let rate = |name: &str| several.channels.iter().find(|channel| channel.location == name).unwrap().sample_rate_hz;
+    assert_eq!((rate("/a/y"), rate("/b/y"), rate("/z")), (Some(1e4), None, Some(5e3)), "{:?}", several.remarks);
     let pair = [(Some(1e4), Some(0.0)), (Some(1e4), Some(0.003))];
     assert_eq!(clocks, [pair, pair, pair].concat(), "{:?}", contents.remarks);
 }

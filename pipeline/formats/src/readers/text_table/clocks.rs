@@ -213,6 +213,17 @@ impl Table<'_> {
                 format!("{location}{guess} runs evenly from {first}: {AS_RATE}; the header says «{}»", step.words);
             return Some((clock, vec![said]));
         }
+        let counts = |step: &&Step| step.known != Known::Count && unit_s.is_none() && counts_samples(column, title);
+        if let Some(step) = self.stated.filter(counts) {
+            let (rate, relative_std) = rate_of_interval(step.seconds, step.unit_s);
+            let start_s = column.values.first().map(|first| first * step.seconds);
+            let guessed = step.known == Known::Guessed;
+            let said = format!("{location} counts the samples: {AS_RATE}; the header says «{}»", step.words);
+            return Some((
+                Clock { rate_hz: Some(rate), relative_std, guessed, start_s, ..Clock::default() },
+                vec![said],
+            ));
+        }
         let times = column.times();
         // the times may go on over headers among the rows
         let whole = times.even(None).map(Stretches::from);
@@ -264,6 +275,11 @@ impl Table<'_> {
         };
         (clock, said)
     }
+}
+
+/// Whether a column is a counter: an index that rises by one.
+fn counts_samples(column: &Column, title: &Title) -> bool {
+    title.name.eq_ignore_ascii_case("index") && column.times().even(None).is_ok_and(|even| even.step == 1.0)
 }
 
 /// The clock of an interval that the header states, if a column of times agrees with it: in its unit, or, where it has
