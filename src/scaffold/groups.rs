@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Contents, FoundChannel, InputFiles, Reading, mean_rate, open_unpacked, recognised};
+use afmid_pipeline::recording::{
+    Contents, FoundChannel, InputFiles, Reading, mean_rate, open_unpacked, rates_agree, recognised,
+};
 use rayon::prelude::*;
 
 use super::channels::{is_input, same_name};
 use super::choice::Question;
 use super::first_file::holds_responses;
 use super::pipeline::Wanted;
-use super::stated::same_rate;
 use crate::cli::Goal;
 use crate::inspect::LEAST_SAMPLES;
 use crate::show::number;
@@ -120,7 +121,7 @@ impl Group {
     }
 
     fn is_at(&self, rate_hz: f64) -> bool {
-        self.rate_hz().is_some_and(|rate| same_rate(rate, rate_hz))
+        self.rate_hz().is_some_and(|rate| rates_agree(rate, rate_hz, 0.0))
     }
 
     /// How many files, at which rate, of what.
@@ -145,7 +146,7 @@ impl Group {
 impl Layout {
     fn is(&self, other: &Self) -> bool {
         let rates = |a: Option<f64>, b: Option<f64>| match (a, b) {
-            (Some(a), Some(b)) => same_rate(a, b),
+            (Some(a), Some(b)) => rates_agree(a, b, 0.0),
             (a, b) => a.is_none() && b.is_none(),
         };
         let alike = |a: &Signal, b: &Signal| a.name == b.name && a.unit == b.unit && rates(a.rate_hz, b.rate_hz);

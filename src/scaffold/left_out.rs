@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use afmid_pipeline::recording::rates_agree;
 use clap::ValueEnum;
 
 use super::channels::some_of;
 use super::groups::Group;
 use super::recordings::Source;
-use super::stated::same_rate;
 use crate::batch::shell::quoted;
 use crate::cli::NewPipelineArgs;
 use crate::show::number as shown;
@@ -81,7 +81,7 @@ fn command(source: &Source, number: usize, args: &NewPipelineArgs, config: &Path
 fn rate_that_chooses(source: &Source, number: usize) -> Option<f64> {
     let group = source.others.get(number)?;
     let rate = group.rate_hz()?;
-    let at = |other: Option<f64>| other.is_some_and(|other| same_rate(other, rate));
+    let at = |other: Option<f64>| other.is_some_and(|other| rates_agree(other, rate, 0.0));
     let larger = |other: &Group| at(other.rate_hz()) && other.files.len() >= group.files.len();
     let rival = source.others.iter().enumerate().any(|(at, other)| at != number && larger(other));
     (!rival && !at(source.rate_hz)).then_some(rate)

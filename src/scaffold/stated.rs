@@ -1,6 +1,6 @@
 //! What a file states of its samples, and what the user has to: sample rate and unit.
 
-use afmid_pipeline::recording::{WANTED_RATE, brief_number, is_rate};
+use afmid_pipeline::recording::{WANTED_RATE, brief_number, is_rate, rates_agree};
 
 use super::choice::Question;
 use super::pipeline::Wanted;
@@ -17,7 +17,7 @@ pub fn rate(source: &Source, channel: &Channel, wanted: &Wanted<'_>, unit: bool)
     match (channel.sample_rate_hz, wanted.rate_hz) {
         (Some(_), None) => Ok(None),
         (None, Some(rate)) => Ok(Some(rate)),
-        (Some(rate), Some(other)) if same_rate(rate, other) => Ok(None),
+        (Some(rate), Some(other)) if rates_agree(rate, other, 0.0) => Ok(None),
         (Some(_), Some(given)) => Ok(Some(given)),
         (None, None) => Err(question(source, channel, wanted, unit)),
     }
@@ -29,17 +29,13 @@ pub fn of_rate(channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
     match (wanted.rate_hz, channel.rate_is_guess) {
         (None, false) => None,
         (None, true) => Some(format!(
-            "the times have no unit and are taken as seconds: {stated} samples a second; --rate HZ says another rate"
+            "the file states no unit of time, seconds or hertz are taken: {stated} samples a second; --rate HZ says \
+             another rate"
         )),
-        (Some(given), _) if same_rate(stated, given) || (given / stated - 1.0).abs() <= 4.0 * channel.rate_std => None,
-        (Some(given), true) => Some(format!("--rate {given} takes the place of {stated}, the times taken as seconds")),
+        (Some(given), _) if rates_agree(given, stated, channel.rate_std) => None,
+        (Some(given), true) => Some(format!("--rate {given} takes the place of {stated}, taken in seconds or hertz")),
         (Some(given), false) => Some(format!("warning: --rate {given} holds, though the file states {stated}")),
     }
-}
-
-/// Whether two rates are one: `io.records` takes them for the same within a millionth.
-pub fn same_rate(a: f64, b: f64) -> bool {
-    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }
 
 /// Whether a config does without a unit that nobody states: of decays and noise it scales the amplitudes alone.

@@ -14,8 +14,9 @@ use crate::facts::{OF_ITS_LENGTH, TAKEN_AS_SECONDS};
 use crate::frequency::{hertz, perhaps_frequencies};
 use crate::guess::why_no_seconds;
 use crate::printed::Printed;
-use crate::rate::{fewest_digits, of_step};
+use crate::rate::{AGREE, ONE_CLOCK, fewest_digits, of_step, unit_that_fits};
 use crate::time_units::{seconds, time_name};
+use crate::together::LEFT_SAMPLES;
 use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
@@ -32,8 +33,6 @@ const REMARKED: f64 = 1e-6;
 /// Of axes that are too long to be read whole: largest deviation from evenness, in steps, and coarsest rounding.
 const LONG_OFF_STEPS: f64 = 1e-2;
 const LONG_COARSEST_STEPS: f64 = 0.25;
-/// Two statements of a rate agree if they differ by less: rates are often written with six digits.
-const AGREE: f64 = 1e-5;
 
 /// Samples read at once.
 const PIECE: usize = 1 << 16;
@@ -103,6 +102,7 @@ pub fn settle(contents: &mut Contents) {
     let is_axis: HashMap<usize, usize> = axes.all.iter().enumerate().map(|(number, axis)| (axis.at, number)).collect();
     let mut said = vec![false; axes.all.len()];
     let mut signals = HashMap::new();
+    let mut starts = Vec::new();
     for at in 0..channels.len() {
         if is_axis.contains_key(&at) {
             continue;
@@ -111,12 +111,18 @@ pub fn settle(contents: &mut Contents) {
         let Some((number, axis)) = fitting.and_then(|number| Some((number, axes.all.get(number)?))) else { continue };
         let name = channels.get(axis.at).map(|axis| axis.location.clone()).unwrap_or_default();
         let Some(channel) = channels.get_mut(at) else { continue };
+        let stated_s = channel.start_s;
         if give(channel, axis, &name, remarks)
             && let Some(said) = said.get_mut(number)
         {
             *said = true;
         }
+        if let (Some(stated), Some(clock)) = (stated_s, &axis.clock) {
+            let times_s = channel.start_s.unwrap_or(clock.start_s);
+            starts.push((at, stated - times_s, clock.step_s));
+        }
     }
+    contradicted_starts(channels, &starts, remarks);
     for axis in &axes.all {
         if let Some(channel) = channels.get_mut(axis.at) {
             channel.is_axis = true;
@@ -135,6 +141,25 @@ pub fn settle(contents: &mut Contents) {
     });
 }
 
+/// Takes starts away that numbers beside the channels and their times state otherwise. A difference that all of them
+/// have is that of two clocks: times count from the trigger, the numbers from 1970.
+fn contradicted_starts(channels: &mut [FoundChannel], starts: &[(usize, f64, f64)], remarks: &mut Vec<String>) {
+    let Some((_, first, _)) = starts.first() else { return };
+    if starts.iter().all(|(_, offset, step)| (offset - first).abs() <= LEFT_SAMPLES * step) {
+        return;
+    }
+    for (at, offset, _) in starts {
+        let Some(channel) = channels.get_mut(*at) else { continue };
+        let (location, times) = (&channel.location, channel.start_s.unwrap_or_default());
+        let said = offset + times;
+        remarks.push(format!(
+            "{location}: it is not known when the first sample was taken: its times begin at {times} s, a number beside \
+             it says {said} s"
+        ));
+        channel.start_s = None;
+    }
+}
+
 /// Gives a channel the rate of its axis. Whether the axis is said by that.
 fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<String>) -> bool {
     let Some(clock) = &axis.clock else {
@@ -144,7 +169,10 @@ fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<S
         }
         return false;
     };
-    let step_s = clock.step_s;
+    // a rate that is stated proves the unit of times without one
+    let proven = channel.sample_rate_hz.filter(|_| clock.guessed);
+    let unit = proven.and_then(|rate| unit_that_fits(clock.step_s, rate.recip())).unwrap_or(1.0);
+    let step_s = clock.step_s * unit;
     let rate = fewest_digits(of_step(step_s), clock.uncertainty);
     let stated = channel.sample_rate_hz;
     let agree = AGREE.max(clock.uncertainty + channel.rate_relative_std);
@@ -158,7 +186,7 @@ fn give(channel: &mut FoundChannel, axis: &Axis, name: &str, remarks: &mut Vec<S
         (channel.rate_relative_std, channel.rate_is_guess) = (clock.relative_std, clock.guessed);
     }
     channel.sample_rate_hz = Some(stated.unwrap_or(rate));
-    channel.start_s = Some(clock.start_s);
+    channel.start_s = Some(clock.start_s * unit);
     if !clock.gaps.is_empty() {
         channel.gaps.extend(&clock.gaps);
         channel.gaps.sort_unstable();
@@ -193,7 +221,36 @@ impl Axes {
                 break;
             }
         }
+        axes.refuse_contradictions(channels, remarks);
         axes
+    }
+
+    /// Times of one group and length, all of stated units, that state other rates give none.
+    fn refuse_contradictions(&mut self, channels: &[FoundChannel], remarks: &mut Vec<String>) {
+        let location = |axis: &Axis| channels.get(axis.at).map_or("", |channel| channel.location.as_str());
+        let mut refused = Vec::new();
+        for ((_, name, ..), numbers) in &self.by_key {
+            let stated = |number: &usize| {
+                let axis = self.all.get(*number)?;
+                let clock = axis.clock.as_ref().filter(|clock| !clock.guessed && matches!(axis.kind, Kind::Time(_)))?;
+                Some((*number, axis, clock))
+            };
+            let mut clocks = numbers.iter().filter_map(stated).filter(|_| name.is_empty());
+            let Some((_, one, first)) = clocks.next() else { continue };
+            let differs = |clock: &Clock| (clock.step_s / first.step_s - 1.0).abs() > ONE_CLOCK + clock.uncertainty;
+            let Some((_, two, second)) = clocks.find(|(_, _, clock)| differs(clock)) else { continue };
+            let (a, b) = (location(one), location(two));
+            remarks.push(format!(
+                "no sample rate: {a} steps by {} s, {b} by {} s: they disagree",
+                first.step_s, second.step_s
+            ));
+            refused.extend(numbers.iter().copied());
+        }
+        for number in refused {
+            if let Some(axis) = self.all.get_mut(number) {
+                axis.clock = None;
+            }
+        }
     }
 
     /// The axis that fits a channel: of its length, in its group or the nearest one around it, and of its cell.

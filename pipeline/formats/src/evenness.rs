@@ -127,9 +127,16 @@ impl<'a> Times<'a> {
         let exact = times.iter().enumerate().all(|(row, &time)| off(row, time) <= EXACT_STEPS * step + self.own(time));
         let unit = |time: f64| self.unit(time) + self.own(time);
         let coarsest = unit(first).max(unit(last));
+        // far from zero the type rounds the times, and with them the step
+        let of_type = || {
+            let uncertainty = type_unit / (steps * step);
+            let rounded = stated_step.is_none() && uncertainty >= KNOWN;
+            let (step, uncertainty) =
+                if rounded { (roundest_step(step, uncertainty), uncertainty) } else { (step, 0.0) };
+            Even { first, step, rounded: false, off_steps: worst(), uncertainty }
+        };
         if exact && (stated_step.is_some() || coarsest > COARSEST_STEPS * step || coarsest < KNOWN * steps * step) {
-            let off_steps = worst();
-            return Ok(Even { first, step, rounded: false, off_steps, uncertainty: 0.0 });
+            return Ok(of_type());
         }
         if coarsest > COARSEST_STEPS * step {
             return Err(coarse(coarsest));
@@ -148,7 +155,7 @@ impl<'a> Times<'a> {
             return Ok(Even { first, step, rounded: !exact, off_steps: worst(), uncertainty });
         }
         if exact {
-            return Ok(Even { first, step, rounded: false, off_steps: worst(), uncertainty: 0.0 });
+            return Ok(of_type());
         }
         if jittered().is_some() {
             let fit = self.fitted().ok_or("it does not rise")?;

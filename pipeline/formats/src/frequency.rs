@@ -24,8 +24,11 @@ pub fn hertz(unit: &str) -> Option<f64> {
 
 /// Hertz in the unit of a rate; none if it is no unit of a rate. `Sa/s` is what oscilloscopes call samples per second.
 pub(crate) fn rate_unit(unit: &str) -> Option<f64> {
-    let lower = unit.to_lowercase();
-    let base = ["hz", "sa/s", "s/s", "sps", "samples/s", "samples per second"];
+    let lower = unit.trim().to_lowercase();
+    if ["samples/min", "samples per minute", "1/min", "/min"].contains(&lower.as_str()) {
+        return Some(1.0 / 60.0);
+    }
+    let base = ["hz", "sa/s", "s/s", "sps", "samples/sec", "samples/s", "samples per second", "1/s"];
     let prefix = base.iter().find_map(|name| lower.strip_suffix(name))?;
     Some(match prefix {
         "" => 1.0,

@@ -92,14 +92,14 @@ fn parted(location: &str) -> (&str, &str) {
     (location.get(..cut).unwrap_or_default(), location.get(cut + 1..).unwrap_or_default())
 }
 
-/// The arrays of signals that lie in a struct or group, by name in lower case, and their channels.
+/// The arrays that lie in a struct or group, by name in lower case, and their channels.
 fn arrays_in(parent: &str, channels: &[FoundChannel]) -> Vec<(String, Vec<usize>)> {
     let mut arrays: Vec<(String, Vec<usize>)> = Vec::new();
     for (at, channel) in channels.iter().enumerate() {
         let whole = channel.location.trim_end_matches(|c: char| c.is_ascii_digit() || "[]{},".contains(c));
         let indexed = channel.location.ends_with([']', '}']);
         let (of, name) = parted(if indexed { whole } else { &channel.location });
-        if of != parent || channel.is_axis || names_times(name) {
+        if of != parent || channel.is_axis {
             continue;
         }
         let name = name.to_lowercase();
@@ -123,12 +123,15 @@ fn meant(
     let count = list.texts.len();
     let is_unit = names.contains(&"units");
     let fits = |found: &Vec<usize>| found.len() == count || (is_unit && count == 1);
-    let possible: Vec<&Vec<usize>> = arrays
-        .iter()
-        .filter(|(name, _)| array.is_empty() || *name == array)
-        .map(|(_, found)| found)
-        .filter(|found| fits(found))
-        .collect();
+    let of_array = |(name, found): &&(String, Vec<usize>)| {
+        let is_meant = if array.is_empty() { !names_times(name) } else { *name == array };
+        is_meant && fits(found)
+    };
+    let mut possible: Vec<&Vec<usize>> = arrays.iter().filter(of_array).map(|(_, found)| found).collect();
+    if possible.is_empty() && is_unit && names_times(&array) {
+        // `time_unit` beside `t`
+        possible = arrays.iter().filter(|(name, _)| names_times(name)).map(|(_, found)| found).collect();
+    }
     let [found] = possible[..] else { return Vec::new() };
     let alone = count == 1;
     let texts: Vec<&String> = list.texts.values().collect();

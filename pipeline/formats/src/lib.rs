@@ -49,7 +49,8 @@ pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
 pub use number::Number;
 pub use rate::{
-    Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, brief_number, is_rate, rate_in, unit_names,
+    Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, agreed_start, brief_number, is_rate, one_number,
+    rate_in, rates_agree, start_in, unit_names,
 };
 pub use raw::Raw;
 pub use readers::raw_binary::{RawBinary, SampleType};
@@ -101,7 +102,7 @@ pub struct FoundChannel {
     pub sample_rate_hz: Option<f64>,
     /// Standard error of that rate, relative: of times and intervals that are rounded or that jitter; 0 where it is stated.
     pub rate_relative_std: f64,
-    /// Whether the rate follows from times without a unit, which were taken as seconds.
+    /// Whether the rate follows from times, an interval or a rate without a unit, which were taken as seconds or hertz.
     pub rate_is_guess: bool,
     /// When the first sample was taken, in seconds on the clock of the file's other channels; none if the file does not
     /// say.

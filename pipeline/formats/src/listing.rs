@@ -5,8 +5,8 @@ use crate::grid::{Grid, Store};
 use crate::labels::Labels;
 use crate::lanes::Lanes;
 use crate::number::Number;
-use crate::rate::{Clue, is_unit_of_clue, rate_in, unit_names};
-use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts};
+use crate::rate::{Clue, is_unit_of_clue, one_number, rate_in, start_in, unit_names};
+use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -38,6 +38,8 @@ pub(crate) struct Array {
     pub(crate) first_axis_fastest: bool,
     /// Number of the first column.
     pub(crate) base: usize,
+    /// Unit, if its type states one: of moments and time differences.
+    pub(crate) unit: String,
     /// Where its bytes are.
     pub(crate) store: Store,
     /// Byte of its first element.
@@ -83,6 +85,9 @@ impl Listing {
             self.units.insert(location.to_owned(), text.trim().to_owned());
         }
         self.labels.add(location, text);
+        let (scope, name) = scope_and_name(location);
+        let clue = Clue::of_text(name, location, text);
+        self.clue(scope, clue);
         self.remark(remark);
     }
 
@@ -95,11 +100,21 @@ impl Listing {
 
     /// A single number: no channel, but it may be the sampling rate.
     pub(crate) fn scalar(&mut self, scope: &str, name: &str, location: &str, value: f64) {
-        if let Some(clue) = Clue::of(name, location, value).filter(|_| self.clue_count < MOST_CLUES) {
+        self.scalar_in(scope, name, location, value, "");
+    }
+
+    /// The same in a unit that its type states.
+    pub(crate) fn scalar_in(&mut self, scope: &str, name: &str, location: &str, value: f64, unit: &str) {
+        self.clue(scope, Clue::of(name, location, value).map(|clue| clue.in_unit(unit)));
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        self.remark(format!("{location} {ONE_NUMBER} {value}{unit}, no channel"));
+    }
+
+    fn clue(&mut self, scope: &str, clue: Option<Clue>) {
+        if let Some(clue) = clue.filter(|_| self.clue_count < MOST_CLUES) {
             self.clue_count += 1;
             self.clues.entry(scope.to_owned()).or_default().push(clue);
         }
-        self.remark(format!("{location} {ONE_NUMBER} {value}, no channel"));
     }
 
     /// An array of at least two numbers. Its bytes must have been found to lie within the file.
@@ -114,6 +129,11 @@ impl Listing {
             return self.remark(format!(
                 "{location} is left out: its {count} channels of {samples} samples are too many to list"
             ));
+        }
+        if let Some(value) = one_clue(array, &lanes) {
+            let (_, name) = scope_and_name(location);
+            self.clue(&array.scope, Clue::of(name, location, value));
+            return self.remark(format!("{location} {ONE_NUMBER} {value}, of several channels, and no channel"));
         }
         self.bytes += bytes;
         if lanes.wide {
@@ -188,6 +208,8 @@ impl Listing {
         let (samples, stored_as) = (grid.samples, grid.number.name());
         let channel = FoundChannel {
             long_name: array.long_name.clone(),
+            unit: array.unit.clone(),
+            is_axis: !array.unit.is_empty(),
             ..FoundChannel::new(location, samples, stored_as, Arc::new(grid))
         };
         self.channels.push((array.scope.clone(), channel));
@@ -219,15 +241,17 @@ impl Listing {
                 *clue = clue.clone().in_unit(unit);
             }
         }
-        let mut rates = BTreeMap::new();
+        let mut clocks = BTreeMap::new();
         for (scope, channel) in &mut self.channels {
-            if !rates.contains_key(scope) {
-                rates.insert(scope.clone(), rate_in(scope, &self.clues));
+            if !clocks.contains_key(scope) {
+                clocks.insert(scope.clone(), (rate_in(scope, &self.clues), start_in(scope, &self.clues)));
             }
-            channel.sample_rate_hz = rates.get(scope).and_then(|(rate, _)| *rate);
+            let Some((rate, start)) = clocks.get(scope) else { continue };
+            (channel.sample_rate_hz, channel.start_s) = (rate.0, start.0);
         }
         let mut said = HashSet::new();
-        let mut about_rates: Vec<String> = rates.into_values().filter_map(|(_, remark)| remark).collect();
+        let mut about_rates: Vec<String> =
+            clocks.into_values().flat_map(|(rate, start)| [rate.1, start.1]).flatten().collect();
         about_rates.retain(|text| said.insert(text.clone()));
         self.unsaid += about_rates.len().saturating_sub(MOST_REMARKS);
         about_rates.truncate(MOST_REMARKS);
@@ -239,4 +263,26 @@ impl Listing {
         self.labels.give(&mut channels);
         Contents { format, started_at: String::new(), channels, responses: self.responses, remarks: self.remarks }
     }
+}
+
+/// The number of an array that is named like a rate, if it holds one alone, once for each channel.
+fn one_clue(array: &Array, lanes: &Lanes) -> Option<f64> {
+    const MOST_NUMBERS: usize = 4096;
+    Clue::of(scope_and_name(&array.location).1, "", 1.0)?;
+    let count = lanes.count().saturating_mul(lanes.samples);
+    let all = Grid {
+        store: array.store.clone(),
+        first: array.first,
+        step: array.item_bytes,
+        samples: count,
+        number: array.number,
+        big_endian: array.big_endian,
+    };
+    (count <= MOST_NUMBERS).then(|| one_number(&all.read(0, count).ok()?.widened())).flatten()
+}
+
+/// `/s` and `fs` of `/s.fs`; the file (empty) and `fs` of `/fs`.
+fn scope_and_name(location: &str) -> (&str, &str) {
+    let cut = location.rfind(['.', '/']).unwrap_or(0);
+    (location.get(..cut).unwrap_or_default(), location.get(cut + 1..).unwrap_or_default())
 }

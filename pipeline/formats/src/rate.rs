@@ -4,6 +4,7 @@ use crate::Contents;
 use crate::facts::RATE_FROM;
 use crate::frequency::rate_unit;
 use crate::printed::Printed;
+use crate::text::{number, quantity};
 use crate::time_units::seconds;
 use std::collections::HashMap;
 
@@ -39,6 +40,16 @@ const INTERVALS: [&str; 10] = [
 ];
 /// In this way of writing alone: other `ts` are stamps.
 const SAMPLING_TIME: &str = "Ts";
+
+/// Names whose value is the instant of the first sample, in seconds unless a unit is stated, likewise. `Tstart` is
+/// PicoScope's, `wf_start_offset` NI's.
+const STARTS: [&str; 6] = ["t0", "tstart", "start", "starttime", "startoffset", "wfstartoffset"];
+/// One of them that may also be the number of a sample or of a row: it is an instant where a rate stands beside it.
+const PERHAPS_START: &str = "start";
+/// Not in this way of writing: it is a temperature.
+const TEMPERATURE: &str = "T0";
+/// Units in which intervals are given, in seconds.
+pub(crate) const INTERVAL_UNITS: [f64; 4] = [1.0, 1e-3, 1e-6, 1e-9];
 /// Ends of the names of units: `sampling_rate_units`.
 const UNIT_ENDS: [&str; 6] = ["_units", "_unit", "Units", "Unit", ".units", ".unit"];
 
@@ -115,7 +126,29 @@ const ALL_DIGITS: usize = 12;
 const ROUND_RATE_DIGITS: usize = 7;
 
 /// Two statements of a rate agree if they differ by less: rates are often written with six digits.
-const AGREE: f64 = 1e-5;
+pub(crate) const AGREE: f64 = 1e-5;
+/// Two rates are one if they differ by less: what is printed to seven digits.
+const SAME_RATE: f64 = 1e-6;
+/// Standard errors by which two statements of one rate differ at most.
+const MOST_STDS: f64 = 4.0;
+/// Largest relative difference of two clocks that tell the same time: those of crystals differ by 1e-4.
+pub(crate) const ONE_CLOCK: f64 = 1e-3;
+
+/// Whether two rates are one, but for their printing and [`MOST_STDS`] of their standard errors together, relative.
+pub fn rates_agree(a: f64, b: f64, relative_std: f64) -> bool {
+    (a / b - 1.0).abs() <= SAME_RATE.max(MOST_STDS * relative_std)
+}
+
+/// The unit of time in which an interval without a unit is that which is stated elsewhere in seconds, if it is one.
+pub(crate) fn unit_that_fits(interval: f64, seconds: f64) -> Option<f64> {
+    let fits = |unit: &f64| (interval * unit / seconds - 1.0).abs() <= AGREE;
+    INTERVAL_UNITS.into_iter().find(fits)
+}
+
+/// Whether an interval without a unit counts samples, or is in units that are not known: whole numbers of seconds.
+pub(crate) fn is_count(interval: f64) -> bool {
+    interval >= 1.0 && interval.fract() == 0.0
+}
 
 /// The rate of a step in seconds, to twelve digits: a difference of two times has no more.
 pub(crate) fn of_step(step_s: f64) -> f64 {
@@ -175,15 +208,52 @@ pub(crate) fn shortest(step: f64) -> f64 {
     if f64::from(single) == step { single.to_string().parse().unwrap_or(step) } else { step }
 }
 
-/// A number that is named like a sampling rate or interval.
+/// The number that all of several are: of each channel the same rate.
+pub fn one_number(numbers: &[f64]) -> Option<f64> {
+    let first = *numbers.first()?;
+    numbers.iter().all(|number| *number == first).then_some(first)
+}
+
+/// A number that is named like a sampling rate, an interval or the instant of the first sample.
 #[derive(Debug, Clone)]
 pub struct Clue {
     location: String,
     value: f64,
-    interval: bool,
-    /// Hertz or seconds in its unit; none if that is none of a rate or an interval.
+    what: What,
+    /// Hertz or seconds in its unit; none if that is none of a rate or a time.
     scale: Option<f64>,
     unit: String,
+    /// Whether its unit is stated, in its name or beside it.
+    has_unit: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum What {
+    Rate,
+    Interval,
+    Start,
+    /// A start if a rate stands beside it.
+    PerhapsStart,
+}
+
+impl What {
+    fn named(name: &str) -> Option<Self> {
+        let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
+        let lower = letters.to_lowercase();
+        if INTERVALS.contains(&lower.as_str()) || letters == SAMPLING_TIME {
+            Some(Self::Interval)
+        } else if RATES.contains(&lower.as_str()) {
+            Some(Self::Rate)
+        } else if lower == PERHAPS_START {
+            Some(Self::PerhapsStart)
+        } else {
+            (STARTS.contains(&lower.as_str()) && letters != TEMPERATURE).then_some(Self::Start)
+        }
+    }
+
+    fn is_start(self) -> bool {
+        matches!(self, Self::Start | Self::PerhapsStart)
+    }
 }
 
 impl Clue {
@@ -192,14 +262,18 @@ impl Clue {
     pub fn of(name: &str, location: &str, value: f64) -> Option<Self> {
         let (bare, unit) = split_unit(name);
         [(name, ""), (bare, unit)].into_iter().find_map(|(name, unit)| {
-            let letters: String = name.chars().filter(|c| c.is_alphanumeric()).collect();
-            let lower = letters.to_lowercase();
-            let interval = INTERVALS.contains(&lower.as_str()) || letters == SAMPLING_TIME;
-            let found = interval || RATES.contains(&lower.as_str());
-            let clue = Self { location: location.to_owned(), value, interval, scale: Some(1.0), unit: String::new() };
+            let what = What::named(name)?;
+            let location = location.to_owned();
+            let clue = Self { location, value, what, scale: Some(1.0), unit: String::new(), has_unit: false };
             // the name says its unit, no message needs to
-            found.then(|| Self { unit: String::new(), ..clue.in_unit(unit) })
+            Some(Self { unit: String::new(), ..clue.in_unit(unit) })
         })
+    }
+
+    /// The same of a text: a number, which may have its unit behind it (`10 kHz`).
+    pub fn of_text(name: &str, location: &str, text: &str) -> Option<Self> {
+        let (value, unit) = quantity(text, number)?;
+        Some(Self::of(name, location, value)?.in_unit(unit))
     }
 
     /// The same in a unit that the file states beside it; an empty one says nothing.
@@ -208,13 +282,18 @@ impl Clue {
         if unit.is_empty() {
             return self;
         }
-        let scale = if self.interval { seconds(unit) } else { rate_unit(unit) };
-        Self { scale, unit: unit.to_owned(), ..self }
+        let scale = if self.what == What::Rate { rate_unit(unit) } else { seconds(unit) };
+        Self { scale, unit: unit.to_owned(), has_unit: true, ..self }
     }
 
     /// Where it is.
     pub(crate) fn location(&self) -> &str {
         &self.location
+    }
+
+    /// Whether it is of a rate or an interval.
+    pub fn is_of_rate(&self) -> bool {
+        !self.what.is_start()
     }
 
     /// It and its value, for messages.
@@ -223,9 +302,14 @@ impl Clue {
         format!("{} = {}{unit}", self.location, brief_number(self.value))
     }
 
+    /// Whether it is an interval in whole numbers without a unit.
+    fn counts(&self) -> bool {
+        self.what == What::Interval && !self.has_unit && is_count(self.value)
+    }
+
     fn rate_hz(&self) -> Option<f64> {
         let value = self.value * self.scale?;
-        let rate = if self.interval {
+        let rate = if self.what == What::Interval {
             rate_of_interval(value, unit_of_shortest(self.value) * self.scale.unwrap_or(1.0)).0
         } else {
             value
@@ -242,34 +326,69 @@ fn split_unit(name: &str) -> (&str, &str) {
     parts.filter(|(_, unit)| is_unit(unit)).unwrap_or((name, ""))
 }
 
+/// What the nearest scope that says anything says: the scope itself, or one around it.
+fn nearest<T>(scope: &str, clues: &HashMap<String, Vec<Clue>>, said: impl Fn(&[Clue]) -> Option<T>) -> Option<T> {
+    let mut scope = scope;
+    loop {
+        if let Some(found) = clues.get(scope).and_then(|here| said(here)) {
+            return Some(found);
+        }
+        scope = scope.get(..scope.rfind(['.', '{', '(', '/'])?).unwrap_or_default();
+    }
+}
+
 /// What the clues of each scope (a struct, or the file: empty) say about the arrays of one. The nearest scope with a
 /// clue decides.
 pub fn rate_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
-    let mut scope = scope;
-    loop {
-        if let Some(here) = clues.get(scope) {
-            return agreed_rate(here);
-        }
-        match scope.rfind(['.', '{', '(', '/']) {
-            Some(cut) => scope = scope.get(..cut).unwrap_or_default(),
-            None => return (None, None),
-        }
-    }
+    let said = |here: &[Clue]| here.iter().any(Clue::is_of_rate).then(|| agreed_rate(here));
+    nearest(scope, clues, said).unwrap_or_default()
+}
+
+/// The same of the instant of their first sample.
+pub fn start_in(scope: &str, clues: &HashMap<String, Vec<Clue>>) -> (Option<f64>, Option<String>) {
+    nearest(scope, clues, agreed_start).unwrap_or_default()
 }
 
 /// The rate that clues give, and what to say of it; none if they disagree or give none.
 pub fn agreed_rate(clues: &[Clue]) -> (Option<f64>, Option<String>) {
-    let named = clues.iter().map(Clue::shown).collect::<Vec<String>>().join(", ");
-    let Some(rates) = clues.iter().map(Clue::rate_hz).collect::<Option<Vec<f64>>>() else {
+    let clues: Vec<&Clue> = clues.iter().filter(|clue| clue.is_of_rate()).collect();
+    let named = clues.iter().map(|clue| clue.shown()).collect::<Vec<String>>().join(", ");
+    let (counts, clear): (Vec<&Clue>, Vec<&Clue>) = clues.iter().partition(|clue| clue.counts());
+    let Some(rates) = clear.iter().map(|clue| clue.rate_hz()).collect::<Option<Vec<f64>>>() else {
         return (None, Some(format!("{UNKNOWN_RATE}: no rate follows from {named}, wanted {WANTED_RATE}")));
     };
-    let first = rates.first().copied().unwrap_or_default();
-    if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) {
+    let Some(&first) = rates.first() else {
+        let why = (!counts.is_empty()).then(|| format!("{UNKNOWN_RATE}: {named} is a whole number without a unit"));
+        return (None, why);
+    };
+    let other_unit = |clue: &&Clue| unit_that_fits(clue.value, first.recip()).is_some();
+    if rates.iter().all(|rate| (rate - first).abs() <= AGREE * first) && counts.iter().all(other_unit) {
         (Some(first), Some(format!("{RATE_FROM} {named}: {first} samples per second")))
     } else {
         (None, Some(format!("{UNKNOWN_RATE} because these disagree: {named}")))
     }
 }
+
+/// The instant of the first sample, in seconds, that clues give, and what to say where they disagree or are in a unit that
+/// is not known; nothing where none is of a start.
+pub fn agreed_start(clues: &[Clue]) -> Option<(Option<f64>, Option<String>)> {
+    let rated = clues.iter().any(Clue::is_of_rate);
+    let is_start = |clue: &&Clue| clue.what == What::Start || (clue.what == What::PerhapsStart && rated);
+    let starts: Vec<&Clue> = clues.iter().filter(is_start).collect();
+    let named = starts.iter().map(|clue| clue.shown()).collect::<Vec<String>>().join(", ");
+    let instant = |clue: &&Clue| clue.scale.map(|scale| clue.value * scale).filter(|start| start.is_finite());
+    let instants: Option<Vec<f64>> = starts.iter().map(instant).collect();
+    let first = *starts.first().map(|_| instants.as_ref().and_then(|all| all.first()))?.unwrap_or(&f64::NAN);
+    // neighbours in float64 are one
+    let same = |other: &f64| (other - first).abs() <= 4.0 * f64::EPSILON * first.abs();
+    if instants.is_some_and(|all| all.iter().all(same)) {
+        return Some((Some(first), None));
+    }
+    Some((None, Some(format!("it is not known when the first sample was taken: {UNKNOWN_START} {named}"))))
+}
+
+/// In remarks on clues that give no start.
+const UNKNOWN_START: &str = "no instant, or more than one, follows from";
 
 #[cfg(test)]
 mod tests {

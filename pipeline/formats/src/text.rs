@@ -42,6 +42,16 @@ pub(crate) fn number(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|x: &f64| x.is_finite())
 }
 
+/// A number and the unit behind it, which is empty if none is there: `4E-9`, `1000 Hz`.
+pub(crate) fn quantity(text: &str, parse: impl Fn(&str) -> Option<f64>) -> Option<(f64, &str)> {
+    let text = text.trim();
+    if let Some(number) = parse(text) {
+        return Some((number, ""));
+    }
+    let unit = text.trim_start_matches(|c: char| !c.is_alphabetic() || matches!(c, 'e' | 'E'));
+    Some((parse(text.strip_suffix(unit)?)?, unit.trim()))
+}
+
 /// At most `most` characters of a text that goes into a message.
 pub(crate) fn brief(text: &str, most: usize) -> String {
     let mut out: String = text.chars().take(most).map(|c| if c.is_control() { ' ' } else { c }).collect();

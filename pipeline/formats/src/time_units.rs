@@ -1,7 +1,9 @@
 //! What units and names say of times.
 
+use crate::text::{number, quantity};
+
 /// Units of time in seconds, in lower case, as files write them.
-const SECONDS: [(&str, f64); 33] = [
+const SECONDS: [(&str, f64); 35] = [
     ("s", 1.0),
     ("sec", 1.0),
     ("secs", 1.0),
@@ -35,6 +37,8 @@ const SECONDS: [(&str, f64); 33] = [
     ("h", 3600.0),
     ("hour", 3600.0),
     ("hours", 3600.0),
+    ("day", 86_400.0),
+    ("days", 86_400.0),
 ];
 /// Units that are long enough to be a name of times by themselves.
 const LEAST_UNIT_NAME: usize = 6;
@@ -70,11 +74,17 @@ pub(crate) struct TimeName {
     pub(crate) label: Option<String>,
 }
 
-/// Seconds in the unit of a time; none if it is no unit of time. `milliseconds since 2020-01-01` is the CF conventions'.
+/// Seconds in the unit of a time; none if it is no unit of time. `milliseconds since 2020-01-01` is the CF conventions',
+/// `1e-3 s` a unit with its factor.
 pub fn seconds(unit: &str) -> Option<f64> {
     let lower = unit.trim().trim_matches(['(', ')', '[', ']', '.', ' ']).to_lowercase();
     let bare = lower.split_once(" since ").map_or(lower.as_str(), |(bare, _)| bare).trim();
-    SECONDS.iter().find(|(name, _)| *name == bare).map(|(_, seconds)| *seconds)
+    let of_name = |unit: &str| SECONDS.iter().find(|(name, _)| *name == unit).map(|(_, seconds)| *seconds);
+    let with_factor = || {
+        let (factor, unit) = quantity(bare, number)?;
+        Some(factor * of_name(unit)?).filter(|seconds| *seconds > 0.0)
+    };
+    of_name(bare).or_else(with_factor)
 }
 
 /// What a name says, if it is one of times. A capital `T` alone is a temperature or a period, unless `any_case`.
@@ -141,10 +151,13 @@ mod tests {
             ("nanoseconds since 1970-01-01 00:00:00", 1e-9),
             ("Milliseconds", 1e-3),
             ("sec.", 1.0),
+            ("1e-3 s", 1e-3),
+            ("10 us", 1e1 * 1e-6),
+            ("days since 2020-01-01", 86_400.0),
         ] {
             assert_eq!(seconds(unit), Some(wanted), "{unit}");
         }
-        for unit in ["", "V", "Hz", "m", "since 1970", "mm"] {
+        for unit in ["", "V", "Hz", "m", "since 1970", "mm", "3", "0 s", "-1 s"] {
             assert_eq!(seconds(unit), None, "{unit}");
         }
     }

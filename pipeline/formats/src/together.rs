@@ -6,14 +6,10 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::{FormatError, FoundChannel, Raw, Source};
+use crate::{FormatError, FoundChannel, Raw, Source, rates_agree};
 
-/// Rates that differ by less, relative, are one: what is printed to seven digits.
-const SAME_RATE: f64 = 1e-6;
-/// Standard errors by which two statements of one rate differ at most.
-const MOST_STDS: f64 = 4.0;
 /// Rest of a difference, in samples, that is left: it turns phases by less than a hundredth of a sample.
-const LEFT_SAMPLES: f64 = 0.005;
+pub(crate) const LEFT_SAMPLES: f64 = 0.005;
 /// Samples on either side that an interpolated one is made from.
 const HALF_WIDTH: usize = 32;
 /// Shape of Kaiser's window: side lobes at -80 dB.
@@ -33,8 +29,7 @@ pub fn one_rate(channels: &[&FoundChannel]) -> Result<(), FormatError> {
     let mut rated = channels.iter().filter_map(|channel| Some((*channel, channel.sample_rate_hz?)));
     let Some((first, rate)) = rated.next() else { return Ok(()) };
     let differs = |(channel, other): &(&FoundChannel, f64)| {
-        let slack = MOST_STDS * (channel.rate_relative_std + first.rate_relative_std);
-        (other / rate - 1.0).abs() > SAME_RATE.max(slack)
+        !rates_agree(*other, rate, channel.rate_relative_std + first.rate_relative_std)
     };
     match rated.find(differs) {
         None => Ok(()),

@@ -43,7 +43,7 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 pub use afmid_formats::{
     Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Row, Source, WANTED_RATE,
     begun_together, brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact, is_rate,
-    lane_names, mean_rate, most_inflated, one_rate, responses, says_frequencies, unit_ratio,
+    lane_names, mean_rate, most_inflated, one_rate, rates_agree, responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use equal::{SamplePrint, equal_samples};

@@ -418,14 +418,27 @@ pub(super) fn text_attribute(owner: &Location, name: &str, allowance: &Allowance
 
 /// A number of any type in an attribute with one value.
 pub(super) fn number_attribute(owner: &Location, place: &str, name: &str) -> Result<f64, StageError> {
+    let fail = |problem: &str| StageError::new(format!("{place}: the attribute `{name}` {problem}"));
+    match numbers_attribute(owner, place, name, 1)?.as_slice() {
+        [value] => Ok(*value),
+        _ => Err(fail("is empty")),
+    }
+}
+
+/// At most so many numbers of any type in an attribute.
+pub(super) fn numbers_attribute(
+    owner: &Location,
+    place: &str,
+    name: &str,
+    most: usize,
+) -> Result<Vec<f64>, StageError> {
     let fail = |problem: String| StageError::new(format!("{place}: the attribute `{name}` {problem}"));
     let attribute = owner.attr(name).map_err(|_| fail("is missing".to_owned()))?;
     let kind = attribute.dtype().and_then(|dtype| dtype.to_descriptor());
     let numeric =
         matches!(kind, Ok(TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) | TypeDescriptor::Float(_)));
-    if !numeric || attribute.size() != 1 {
+    if !numeric || !(1..=most).contains(&attribute.size()) {
         return Err(fail("is not a single number".to_owned()));
     }
-    let values = attribute.read_raw::<f64>().map_err(|error| fail(format!("cannot be read: {error}")))?;
-    values.first().copied().ok_or_else(|| fail("is empty".to_owned()))
+    attribute.read_raw::<f64>().map_err(|error| fail(format!("cannot be read: {error}")))
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use afmid_formats::{begun_together, one_rate};
+use afmid_formats::{begun_together, one_rate, rates_agree};
 
 use super::contents::{format_of, is_hdf5_file, is_recognised};
 use super::how::{AUTO, HDF5, How, NATIVE, Reading};
@@ -12,7 +12,7 @@ use super::input_files::InputFiles;
 use super::lazy_source::LazySource;
 use super::native::{Wanted, open_if_native, open_native};
 use super::opened_files::contents;
-use super::rate::{AgreedRate, agreed_rate, checked, differ, overruled};
+use super::rate::{AgreedRate, agreed_rate, checked, overruled};
 use super::stretches::uninterrupted;
 use super::{Channel, Contents, FoundChannel, Record, contradiction};
 use crate::error::StageError;
@@ -50,7 +50,7 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
     if let Some(mut record) = native {
         let stated = record.sample_rate_hz;
         let given = checked(how.sample_rate_hz).map_err(|error| error.at(path))?;
-        let given = given.filter(|given| differ(stated, *given));
+        let given = given.filter(|given| !rates_agree(stated, *given, 0.0));
         let remarks = given.map(|given| overruled("the record", stated, given, false)).into_iter().collect();
         record.sample_rate_hz = given.unwrap_or(stated);
         for wanted in wanted {

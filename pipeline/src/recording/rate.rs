@@ -1,11 +1,8 @@
 //! The rate of a record: the file's, or the user's.
 
-use afmid_formats::{FoundChannel, WANTED_RATE, brief_number, is_rate};
+use afmid_formats::{FoundChannel, WANTED_RATE, brief_number, is_rate, rates_agree};
 
 use crate::error::StageError;
-
-/// What two statements of a rate may differ by, relative: what is printed to seven digits.
-const SAME_RATE: f64 = 1e-6;
 
 /// A rate, and what to say of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,12 +29,10 @@ pub fn agreed_rate(channel: &FoundChannel, given: Option<f64>, said: Option<&str
     let stated = channel.sample_rate_hz;
     let given = checked(given)?;
     match (stated, given) {
-        (Some(stated), Some(given)) if differ(stated, given) && !within(stated, given, channel.rate_relative_std) => {
-            Ok(AgreedRate {
-                overruled: Some(overruled(what, stated, given, channel.rate_is_guess)),
-                ..AgreedRate::known(given)
-            })
-        }
+        (Some(stated), Some(given)) if !rates_agree(given, stated, channel.rate_relative_std) => Ok(AgreedRate {
+            overruled: Some(overruled(what, stated, given, channel.rate_is_guess)),
+            ..AgreedRate::known(given)
+        }),
         (_, Some(given)) => Ok(AgreedRate::known(given)),
         (Some(rate), None) => Ok(AgreedRate { relative_std: channel.rate_relative_std, ..AgreedRate::known(rate) }),
         (None, None) => Err(StageError::new(match said {
@@ -63,19 +58,9 @@ pub(super) fn checked(given: Option<f64>) -> Result<Option<f64>, StageError> {
 pub(super) fn overruled(what: &str, stated: f64, given: f64, guessed: bool) -> String {
     match guessed {
         true => format!(
-            "{what}: `sample_rate_hz` is given as {given}; the times, which have no unit, would have {stated} as seconds"
+            "{what}: `sample_rate_hz` is given as {given}; what the file states without a unit would be {stated}, taken as \
+             seconds or hertz"
         ),
         false => format!("{what}: `sample_rate_hz` is given as {given} and holds, though the file states {stated}"),
     }
-}
-
-/// Whether a rate that is given is one that the file's times allow.
-fn within(stated: f64, given: f64, relative_std: f64) -> bool {
-    const MOST_STDS: f64 = 4.0;
-    (given / stated - 1.0).abs() <= MOST_STDS * relative_std
-}
-
-/// Whether two rates are two.
-pub(super) fn differ(a: f64, b: f64) -> bool {
-    (a / b - 1.0).abs() > SAME_RATE
 }

@@ -134,7 +134,7 @@ fn archives_stored_and_deflated() {
         assert_eq!(deflection[499], -0.8931150880476102);
         let codes = (0..500).map(|n| f64::from((2 * n + 1) * 7));
         assert_eq!(samples(&contents.channels[2]), codes.collect::<Vec<f64>>());
-        for text in ["/fs = 2500000", "/label holds texts of 2", "/spectrum is complex"] {
+        for text in ["/fs = 2500000", "/label is the text \"nm\"", "/spectrum is complex"] {
             assert!(remarked(&contents, text), "{text}: {:?}", contents.remarks);
         }
     }

@@ -86,7 +86,13 @@ fn moments_give_the_rate_and_the_beginning() {
 
 #[test]
 fn times_and_texts_give_the_rate_and_counters_none() {
-    let rates = [("times", Some(1000.0)), ("pandas_times", Some(1000.0)), ("rate", Some(2500.0))];
+    let rates = [
+        ("times", Some(1000.0)),
+        ("pandas_times", Some(1000.0)),
+        ("rate", Some(2500.0)),
+        ("differences", Some(5000.0)),
+        ("pandas_differences", Some(2000.0)),
+    ];
     for (name, rate) in rates {
         let contents = open(name);
         assert_eq!(locations(&contents), ["/y"], "{name}: {:?}", contents.remarks);

@@ -128,6 +128,23 @@ fn lvm_sections_join_and_gaps_show() {
 }
 
 #[test]
+fn lvm_times_that_jump_are_gaps_and_sections_behind_them_go_on() {
+    let row = |x: f64| format!("{x:.2}\t{x}\t1\n");
+    let part = |from: f64| (0..40).map(|k| row(from + 0.5 * f64::from(k))).collect::<String>();
+    let rows = part(0.0) + &part(30.0);
+    let head = LVM_HEAD.replace("X_Columns\tNo", "X_Columns\tOne");
+    assert_ne!(head, LVM_HEAD);
+    for step in ["0.5", ""] {
+        let sections = [section("00:00:00.0", "0", &rows), "\n".to_owned(), section("00:00:00.0", "0", &part(50.0))];
+        let text = head.clone() + &sections.concat().replace("Delta_X\t0.5\t0.5", &format!("Delta_X\t{step}\t{step}"));
+        let found = table("jump.lvm", &text);
+        let a = channel(&found, "a");
+        assert_eq!((a.sample_rate_hz, a.gaps.as_slice()), (Some(2.0), &[40][..]), "{step} {:?}", found.remarks);
+        assert!(remarked(&found, "a gap"), "{:?}", found.remarks);
+    }
+}
+
+#[test]
 fn lvm_rows_behind_a_blank_line_go_on_and_holes_are_nan() {
     let special = "***Start_Special***\nanything\t1\n***End_Special***\n";
     let text =
@@ -431,5 +448,5 @@ fn a_stated_interval_and_the_times_must_agree() {
     assert_eq!(described(&coarse), [("a", "", Some(4000.0))], "{:?}", coarse.remarks);
     let wrong = table("wrong.csv", "Sample Interval,0.5\nTIME,a\n0.0,1\n0.1,2\n0.2,3\n");
     assert_eq!(described(&wrong), [("TIME", "", None), ("a", "", None)]);
-    assert!(remarked(&wrong, "no sample rate: TIME steps by 1e-1, the header says «Sample Interval 0.5»"));
+    assert!(remarked(&wrong, "no sample rate: TIME steps by 0.1, the header says «Sample Interval 0.5»"));
 }

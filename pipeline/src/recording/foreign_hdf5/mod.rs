@@ -79,7 +79,16 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 remarks.push(format!("{} is the single number {value}, no channel", found.location));
                 continue;
             }
-            Ok(Variable::Series(series)) => series,
+            Ok(Variable::Series(series)) => {
+                if let Some(value) = Scopes::one_number(&found) {
+                    scopes.number(&found, value, allowance);
+                    let location = &found.location;
+                    remarks
+                        .push(format!("{location} is the single number {value}, of several channels, and no channel"));
+                    continue;
+                }
+                series
+            }
             Err(why) => {
                 let texts = if matlab { labels::texts(&found, allowance) } else { Vec::new() };
                 if texts.is_empty() {
@@ -88,6 +97,9 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 for (location, text) in texts {
                     remarks.push(format!("{location} is the text \"{}\"", text.escape_debug()));
                     texts_found.add(&location, &text);
+                    if location == found.location {
+                        scopes.text(&found, &text);
+                    }
                 }
                 continue;
             }
@@ -108,12 +120,20 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
     let native = states_rate(&file);
     let mut channels = Vec::new();
     for (found, series) in &variables {
-        let (rate, remark) = match found.stated.as_ref().and_then(|stated| stated.sample_rate_hz) {
-            Some(rate) => (Some(rate), None),
-            None => scopes.rate_of(found, allowance),
-        };
+        let [mut rate, mut start] = scopes.clock_of(found, allowance);
+        let of_dialect = found.stated.as_ref();
+        if let Some(known) = of_dialect.and_then(|stated| stated.sample_rate_hz) {
+            rate = (Some(known), None);
+        }
+        if let Some(known) = of_dialect.and_then(|stated| stated.start_s) {
+            start = (Some(known), None);
+        }
         remarks.extend(found.stated.iter().flat_map(|stated| stated.remarks.clone()));
-        remarks.extend(remark.filter(|remark| !remarks.contains(remark)));
+        for remark in [rate.1, start.1].into_iter().flatten() {
+            if !remarks.contains(&remark) {
+                remarks.push(remark);
+            }
+        }
         for series in series {
             if channels.len() + series.lanes() > MOST_CHANNELS {
                 let (location, count) = (&found.location, series.lanes());
@@ -121,7 +141,7 @@ pub(super) fn open(files: &InputFiles, path: &Path) -> Result<Contents, StageErr
                 continue;
             }
             let base = if matlab { 1 } else { 0 };
-            let about = About { scopes: &scopes, sample_rate_hz: rate, base, native, allowance };
+            let about = About { scopes: &scopes, sample_rate_hz: rate.0, start_s: start.0, base, native, allowance };
             match series.channels((files, path, &hashed), found, &about, &mut remarks) {
                 Ok(more) => channels.extend(more),
                 Err(error) => {

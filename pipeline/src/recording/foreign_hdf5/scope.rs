@@ -2,15 +2,17 @@
 
 use std::collections::{HashMap, HashSet};
 
-use afmid_formats::{Clue, agreed_rate, rate_in, seconds, unit_names};
+use afmid_formats::{Clue, agreed_rate, agreed_start, one_number, rate_in, start_in, unit_names};
 use hdf5::Location;
 
 use super::walk::Found;
 use crate::hdf5_files::read::{Allowance, attribute_names};
-use crate::recording::native::{has_attribute, number_attribute, text_attribute};
+use crate::recording::native::{has_attribute, number_attribute, numbers_attribute, text_attribute};
 
 /// More statements of a rate are ignored: a damaged file could make millions.
 const MOST_CLUES: usize = 4096;
+/// A rate that is stated once for each channel is stated at most so often.
+const MOST_NUMBERS: usize = 4096;
 
 /// Clues by the path of the group that they are about; empty for the file.
 #[derive(Debug, Default)]
@@ -58,6 +60,13 @@ impl Scopes {
         }
     }
 
+    /// The number that a small array is throughout, if it is named like a rate: that of several channels.
+    pub(super) fn one_number(found: &Found) -> Option<f64> {
+        Clue::of(&found.name, "", 1.0)?;
+        let size = found.dataset.size();
+        (1..=MOST_NUMBERS).contains(&size).then(|| one_number(&found.dataset.read_raw::<f64>().ok()?)).flatten()
+    }
+
     fn add(&mut self, scope: &str, clue: Clue) {
         if self.count < MOST_CLUES {
             self.count += 1;
@@ -75,24 +84,22 @@ impl Scopes {
         self.encoders.get(group)
     }
 
-    /// The rate of a dataset, and what to say of it.
-    pub(super) fn rate_of(&self, found: &Found, allowance: &Allowance) -> (Option<f64>, Option<String>) {
+    /// The rate of a dataset and the instant of its first sample, each with what to say of it.
+    pub(super) fn clock_of(&self, found: &Found, allowance: &Allowance) -> [(Option<f64>, Option<String>); 2] {
         let own: Vec<Clue> = clues(&found.dataset, &found.location, allowance);
-        if own.is_empty() { rate_in(&found.group, &self.clues) } else { agreed_rate(&own) }
+        let rate = match own.iter().any(Clue::is_of_rate) {
+            true => agreed_rate(&own),
+            false => rate_in(&found.group, &self.clues),
+        };
+        [rate, agreed_start(&own).unwrap_or_else(|| start_in(&found.group, &self.clues))]
     }
-}
 
-/// Names of attributes that state when the first sample of a dataset was taken, in seconds unless a unit is stated
-/// beside them.
-const STARTS: [&str; 6] = ["t0", "t_start", "start_s", "start_time", "start_offset", "wf_start_offset"];
-
-/// When the first sample of a dataset was taken, in seconds; none where no number says so, or one in an unknown unit.
-pub(super) fn start_of(dataset: &Location, path: &str, allowance: &Allowance) -> Option<f64> {
-    let names = attribute_names(dataset);
-    let name = STARTS.into_iter().find(|start| names.iter().any(|name| name == start))?;
-    let value = number_attribute(dataset, path, name).ok().filter(|value| value.is_finite())?;
-    let unit = unit_names(name).into_iter().find_map(|name| text_attribute(dataset, &name, allowance));
-    Some(value * unit.map_or(Some(1.0), |unit| seconds(&unit))?)
+    /// Takes a text that lies beside datasets.
+    pub(super) fn text(&mut self, found: &Found, text: &str) {
+        if let Some(clue) = Clue::of_text(&found.name, &found.location, text) {
+            self.add(&found.group, clue);
+        }
+    }
 }
 
 /// What the attributes of an object say of a rate, each in the unit that an attribute beside it states.
@@ -101,9 +108,13 @@ fn clues(object: &Location, path: &str, allowance: &Allowance) -> Vec<Clue> {
     let clue = |name: &String| {
         // only attributes that are named like a rate are read
         Clue::of(name, "", 0.0)?;
-        let value = number_attribute(object, path, name).ok()?;
+        let location = format!("{path}@{name}");
+        let clue = match numbers_attribute(object, path, name, MOST_NUMBERS) {
+            Ok(numbers) => Clue::of(name, &location, one_number(&numbers)?),
+            Err(_) => Clue::of_text(name, &location, &text_attribute(object, name, allowance)?),
+        };
         let unit = unit_names(name).into_iter().find_map(|name| text_attribute(object, &name, allowance));
-        Some(Clue::of(name, &format!("{path}@{name}"), value)?.in_unit(&unit.unwrap_or_default()))
+        Some(clue?.in_unit(&unit.unwrap_or_default()))
     };
     names.iter().filter_map(clue).collect()
 }

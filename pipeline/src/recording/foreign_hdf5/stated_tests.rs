@@ -236,3 +236,44 @@ fn a_segment_has_a_start_of_its_own() {
     let starts = ["Channel 2 Seg1Data", "Channel 2 Seg2Data"].map(|name| start(name).start_s);
     assert_eq!(starts, [Some(-0.5), Some(-0.01)]);
 }
+
+#[test]
+fn rates_and_starts_lie_in_attributes_of_a_dataset_or_its_group_and_in_numbers_beside_it() {
+    let line = Array1::from_shape_fn(50, |sample| sample as f64);
+    let contents = opened("starts", |file| {
+        for (path, late) in [("a", 0.0), ("b", 3.0)] {
+            let group = file.create_group(path).unwrap();
+            let data = group.new_dataset_builder().with_data(&line).create("y").unwrap();
+            text(&data, "fs", "10 kHz");
+            number(&data, "start", late);
+            text(&data, "start_unit", "ms");
+        }
+        for (path, late) in [("c", 0.0), ("d", 0.003)] {
+            let group = file.create_group(path).unwrap();
+            number(&group, "dt", 1e-4);
+            number(&group, "t_start", late);
+            group.new_dataset_builder().with_data(&line).create("y").unwrap();
+        }
+        for (path, late) in [("e", 0.0), ("f", 0.003)] {
+            let group = file.create_group(path).unwrap();
+            for (name, value) in [("fs", 1e4), ("t0", late)] {
+                group.new_dataset::<f64>().create(name).unwrap().write_scalar(&value).unwrap();
+            }
+            group.new_dataset_builder().with_data(&line).create("y").unwrap();
+        }
+    });
+    let clocks: Vec<_> = contents.channels.iter().map(|channel| (channel.sample_rate_hz, channel.start_s)).collect();
+    let several = opened("several-rates", |file| {
+        for (path, rates) in [("a", [1e4, 1e4]), ("b", [1e4, 2e4])] {
+            let group = file.create_group(path).unwrap();
+            group.new_dataset_builder().with_data(&rates).create("fs").unwrap();
+            group.new_dataset_builder().with_data(&line).create("y").unwrap();
+        }
+        let data = file.new_dataset_builder().with_data(&line).create("z").unwrap();
+        data.new_attr_builder().with_data(&[5e3, 5e3]).create("fs").unwrap();
+    });
+    let rate = |name: &str| several.channels.iter().find(|channel| channel.location == name).unwrap().sample_rate_hz;
+    assert_eq!((rate("/a/y"), rate("/b/y"), rate("/z")), (Some(1e4), None, Some(5e3)), "{:?}", several.remarks);
+    let pair = [(Some(1e4), Some(0.0)), (Some(1e4), Some(0.003))];
+    assert_eq!(clocks, [pair, pair, pair].concat(), "{:?}", contents.remarks);
+}

@@ -8,7 +8,7 @@ use hdf5::types::{CompoundType, IntSize, TypeDescriptor};
 
 use super::matrix::{Lane, Matrix};
 use super::pandas;
-use super::scope::{self, Scopes};
+use super::scope::Scopes;
 use super::times::Times;
 use super::walk::Found;
 use crate::error::StageError;
@@ -36,6 +36,7 @@ type Indexed = (String, Arc<dyn Source>);
 pub(super) struct About<'a> {
     pub(super) scopes: &'a Scopes,
     pub(super) sample_rate_hz: Option<f64>,
+    pub(super) start_s: Option<f64>,
     /// Number of the first channel.
     pub(super) base: usize,
     /// Whether the file is a native record, whose numbers are values where it states no scale.
@@ -184,13 +185,11 @@ impl Series {
         let described = self.describe(found, about, remarks)?;
         let sources = self.sources(file, found, about.base)?;
         let named = |lane: usize| described.names.get(lane).map(|name| format!("{}/{name}", found.group));
-        let of_dialect = found.stated.as_ref().and_then(|stated| stated.start_s);
-        let start_s = of_dialect.or_else(|| scope::start_of(&found.dataset, &found.location, about.allowance));
         let channel = |(lane, (index, source)): (usize, Indexed)| FoundChannel {
             unit: described.unit.clone(),
             long_name: described.long_name.clone(),
             sample_rate_hz: about.sample_rate_hz,
-            start_s,
+            start_s: about.start_s,
             scale_factor: described.scale_factor * found.stated.as_ref().map_or(1.0, |stated| stated.factor(lane)),
             add_offset: described.add_offset,
             fill_code: described.fill_code,

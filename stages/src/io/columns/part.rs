@@ -208,7 +208,8 @@ impl Channels {
         if rated.rate_is_guess && wanted.sample_rate_hz.is_none() {
             let rate = agreed.rate_hz;
             let said = format!(
-                "the times have no unit and are taken as seconds, {rate} samples a second: `sample_rate_hz` says another rate"
+                "the file states no unit of time, seconds or hertz are taken, {rate} samples a second: `sample_rate_hz` \
+                 says another rate"
             );
             agreed.overruled.get_or_insert(said);
         }

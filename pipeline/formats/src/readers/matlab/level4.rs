@@ -144,6 +144,7 @@ fn variable(listing: &mut Listing, stream: &mut Stream, pinned: &Pinned, header:
         shape: vec![rows as usize, columns as usize],
         first_axis_fastest: true,
         base: 1,
+        unit: String::new(),
         store: Store::File(pinned.clone()),
         first,
         item_bytes: number.bytes(),

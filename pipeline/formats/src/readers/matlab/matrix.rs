@@ -135,6 +135,7 @@ impl Walk<'_> {
             shape: head.shape.clone(),
             first_axis_fastest: true,
             base: 1,
+            unit: String::new(),
             store: self.store.clone(),
             first,
             item_bytes: number.bytes(),

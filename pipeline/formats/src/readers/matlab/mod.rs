@@ -11,7 +11,7 @@
 //! axis that is longer than 1 is time. Locations are as MATLAB counts, from 1: `/x`, column 2 `/x[2]`, `/x[2,3]`, field
 //! `/s.f`, `/s(2).f` of an array of structs, `/c{2}` of a cell array. Single numbers are remarks, as are texts; the
 //! sampling rate comes from a single number with a usual name (`fs`, `dt`, `Tinterval`, ...) in the same struct or,
-//! failing that, around it; or from an array of times (`t`, `time`, an `xData` beside `yData`) that runs evenly. Texts beside
+//! failing that, around it, as the instant of the first sample does (`t0`, `t_start`, ...); or from an array of times (`t`, `time`, an `xData` beside `yData`) that runs evenly. Texts beside
 //! an array (`units`, `names{1}`, `acc_units`) are units and long names of its channels where no other array can be meant.
 //!
 //! A compressed variable of at most 64 MiB is inflated to its end when the file is opened, so that damage shows, and
@@ -46,7 +46,7 @@ impl Format for Mat {
                 arrays for `io.frf`",
         leaves_out: "sparse, text, objects: left out; damaged or mangled files: refused",
         described_by: "MathWorks, \"MAT-File Format\"",
-        clock: "arrays of times; numbers named `fs`, `dt`, `Tinterval`, ...",
+        clock: "arrays of times; numbers named `fs`, `dt`, `Tinterval`, `t0`, ...",
         unit: "texts named `units`",
     };
 

@@ -13,7 +13,7 @@ use crate::grid::{Grid, Store};
 use crate::lanes::Lanes;
 use crate::number::Number;
 use crate::opened::Opened;
-use crate::rate::{Clue, rate_in};
+use crate::rate::{Clue, one_number, rate_in, start_in, unit_names};
 use crate::text::brief;
 use crate::time_units::names_times;
 use crate::{Contents, FormatError, FoundChannel, Source, fail, hertz};
@@ -66,13 +66,17 @@ pub(super) fn contents(file: &Opened, header: &Header) -> Result<Contents, Forma
 }
 
 impl Found {
-    /// Takes the numbers that are named like a rate among attributes.
+    /// Takes the numbers that are named like a rate or a start among attributes.
     fn clues_of(&mut self, scope: &str, location: &str, attributes: &[Attribute]) {
         for attribute in attributes {
-            let Value::Numbers(numbers) = &attribute.value else { continue };
-            let [value] = numbers.as_slice() else { continue };
             let name = &attribute.name;
-            self.clue(scope, Clue::of(name, &format!("{location}:{}", name.escape_debug()), *value));
+            let location = format!("{location}:{}", name.escape_debug());
+            let clue = match &attribute.value {
+                Value::Numbers(numbers) => one_number(numbers).and_then(|value| Clue::of(name, &location, value)),
+                Value::Text(text) => Clue::of_text(name, &location, text),
+            };
+            let unit = unit_names(name).into_iter().find_map(|name| text(attributes, &name));
+            self.clue(scope, clue.map(|clue| clue.in_unit(unit.unwrap_or_default())));
         }
     }
 
@@ -191,17 +195,19 @@ impl Found {
             let problem = format!("found no variable of numbers ({why}), wanted one");
             return Err(fail::at(header.end, problem, fail::COPY_AGAIN));
         }
-        let mut rates = HashMap::from([(String::new(), rate_in("", &self.clues))]);
+        let clock = |scope: &str| (rate_in(scope, &self.clues), start_in(scope, &self.clues));
+        let mut clocks = HashMap::from([(String::new(), clock(""))]);
         for scope in self.clues.keys() {
-            rates.insert(scope.clone(), rate_in(scope, &self.clues));
+            clocks.insert(scope.clone(), clock(scope));
         }
         let mut said = HashSet::new();
         for along in &mut self.channels {
-            let scope = if rates.contains_key(&along.scope) { along.scope.as_str() } else { "" };
-            let Some((rate, remark)) = rates.get(scope) else { continue };
-            along.channel.sample_rate_hz = rate.filter(|_| !along.channel.is_axis);
-            if let Some(remark) = remark.as_ref().filter(|_| said.insert(scope.to_owned())) {
-                self.remarks.push(remark.clone());
+            let scope = if clocks.contains_key(&along.scope) { along.scope.as_str() } else { "" };
+            let Some((rate, start)) = clocks.get(scope) else { continue };
+            along.channel.sample_rate_hz = rate.0.filter(|_| !along.channel.is_axis);
+            along.channel.start_s = start.0;
+            if said.insert(scope.to_owned()) {
+                self.remarks.extend([&rate.1, &start.1].into_iter().flatten().cloned());
             }
         }
         let mut remarks = self.remarks;

@@ -2,6 +2,7 @@
 
 use super::literal::Literal;
 use crate::number::Number;
+use crate::time_units::seconds;
 
 /// Structs in structs beyond this are refused, so that no file can exhaust the stack or, by arrays of arrays, the
 /// memory.
@@ -32,8 +33,24 @@ pub(super) enum Part {
     Number(Number, bool),
     /// Real and imaginary part, one behind the other, likewise.
     Complex(Number, bool),
+    /// A text of so many bytes, in four for a character or in one, in big-endian order or not.
+    Text { bytes: u64, wide: bool, big_endian: bool },
+    /// Moments since 1970 or time differences: whole numbers of this unit, in big-endian order or not.
+    Times { unit: String, big_endian: bool },
     /// Anything else, in words.
     Other(String),
+}
+
+impl Part {
+    /// In words, if it is no number and no complex one.
+    pub(super) fn no_number(&self) -> Option<String> {
+        match self {
+            Self::Number(..) | Self::Complex(..) | Self::Times { .. } => None,
+            Self::Text { bytes, wide: true, .. } => Some(format!("texts of {} characters", bytes / 4)),
+            Self::Text { bytes, .. } => Some(format!("byte strings of {bytes}")),
+            Self::Other(what) => Some(what.clone()),
+        }
+    }
 }
 
 /// Parts and size of an element, from the header's `descr`. Error: what is wrong with it.
@@ -126,6 +143,7 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
     let mut rest = code.chars();
     let kind = rest.nth(1).ok_or_else(wrong)?;
     let size = rest.as_str();
+    let unit = size.split_once('[').and_then(|(_, unit)| unit.strip_suffix(']')).unwrap_or_default();
     let size = size.split('[').next().unwrap_or_default();
     if kind == 'O' {
         return Ok((Part::Other(PICKLED.to_owned()), 8));
@@ -145,6 +163,14 @@ fn simple(code: &str) -> Result<(Part, u64), String> {
         ('f', 8) => Number::F64,
         ('c', 8) => return Ok((Part::Complex(Number::F32, order == '>'), size)),
         ('c', 16) => return Ok((Part::Complex(Number::F64, order == '>'), size)),
+        ('U', _) => {
+            let bytes = size.checked_mul(4).ok_or_else(wrong)?;
+            return Ok((Part::Text { bytes, wide: true, big_endian: order == '>' }, bytes));
+        }
+        ('S' | 'a', _) => return Ok((Part::Text { bytes: size, wide: false, big_endian: false }, size)),
+        ('M' | 'm', 8) if seconds(unit).is_some() => {
+            return Ok((Part::Times { unit: unit.to_owned(), big_endian: order == '>' }, size));
+        }
         _ => return other(kind, size).map(|(what, bytes)| (Part::Other(what), bytes)).ok_or_else(wrong),
     };
     Ok((Part::Number(number, order == '>'), size))
@@ -154,8 +180,6 @@ fn other(kind: char, size: u64) -> Option<(String, u64)> {
     Some(match kind {
         'f' => (format!("{}-bit floating point numbers", size.saturating_mul(8)), size),
         'c' => (format!("{}-bit complex numbers", size.saturating_mul(8)), size),
-        'S' | 'a' => (format!("byte strings of {size}"), size),
-        'U' => (format!("texts of {size} characters"), size.checked_mul(4)?),
         'V' => (format!("{size} bytes without a type"), size),
         'M' => ("dates".to_owned(), size),
         'm' => ("durations".to_owned(), size),

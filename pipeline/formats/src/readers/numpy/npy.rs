@@ -20,7 +20,7 @@ impl Format for Npy {
         name: "npy",
         title: "NumPy array",
         reads: "versions 1 to 3, integers, float16 to float64, structured arrays, C and Fortran order",
-        leaves_out: "objects, dates, complex numbers",
+        leaves_out: "objects, texts, complex numbers",
         described_by: "NumPy, \"NEP 1\" and `numpy.lib.format`",
         clock: "",
         unit: "",
@@ -46,7 +46,7 @@ impl Format for Npy {
             return Err(fail::at(0, "the array holds complex numbers, and no frequencies lie beside it", help));
         }
         if let [field] = header.fields.as_slice()
-            && let Part::Other(what) = &field.what
+            && let Some(what) = field.what.no_number()
         {
             let problem =
                 format!("the array holds {what}; integers or 16-, 32- or 64-bit floating point numbers were wanted");

@@ -22,10 +22,10 @@ impl Format for Npz {
         name: "npz",
         title: "NumPy archive",
         reads: "as NPY, deflated or not; objects leave the other arrays as they are; complex arrays for `io.frf`",
-        leaves_out: "objects, dates",
+        leaves_out: "objects",
         described_by: "NumPy, \"NEP 1\" and `numpy.lib.format`",
-        clock: "arrays of times; numbers named `fs`, `dt`, ...",
-        unit: "",
+        clock: "arrays of times, moments and time differences; numbers named `fs`, `dt`, `t0`, ...",
+        unit: "texts named `units`",
     };
 
     /// A zip archive whose first member or own name says so: many other formats are zip archives as well.

@@ -1,6 +1,7 @@
-//! Units that Arrow keeps with the fields of a table: its schema lies in a Parquet file as a text in base 64.
+//! Units, and time differences, that Arrow keeps with the fields of a table: its schema lies in a Parquet file as a text in base 64.
 //!
-//! Only what leads to them is read: of a message its schema, of that the fields, of each the name and the metadata.
+//! Only what leads to them is read: of a message its schema, of that the fields, of each the name, the type and the
+//! metadata.
 //!
 //! Source: Apache Arrow, "Arrow columnar format" and "Schema.fbs", "Message.fbs"; Google, "FlatBuffers internals".
 
@@ -10,18 +11,31 @@ pub(super) const KEY: &str = "ARROW:schema";
 /// More fields or pairs are no recording.
 const MOST_ITEMS: usize = 1 << 16;
 
+/// Number of the type of time differences, and their units.
+const DURATION: usize = 18;
+const DURATION_UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
+
+/// The unit of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Unit {
+    pub(super) unit: String,
+    /// Whether it is that of time differences, by their type.
+    pub(super) of_duration: bool,
+}
+
 /// Names and units of the fields that state one. Empty if the text is none of a schema.
-pub(super) fn units(text: &str) -> Vec<(String, String)> {
+pub(super) fn units(text: &str) -> Vec<(String, Unit)> {
     base64(text).and_then(|bytes| in_message(&bytes)).unwrap_or_default()
 }
 
-fn in_message(bytes: &[u8]) -> Option<Vec<(String, String)>> {
+fn in_message(bytes: &[u8]) -> Option<Vec<(String, Unit)>> {
     // a mark and the length stand before the message, in old files the length alone
     let head = if bytes.starts_with(&[0xff; 4]) { 8 } else { 4 };
     let buffer = Buffer(bytes.get(head..)?);
     let message = buffer.follow(0)?;
     let schema = buffer.inner(message, 2)?;
-    let named = |field| Some((buffer.text(field, 0)?, unit(&buffer, field)?));
+    let stated = |field| unit(&buffer, field).map(|unit| Unit { unit, of_duration: false });
+    let named = |field| Some((buffer.text(field, 0)?, duration(&buffer, field).or_else(|| stated(field))?));
     Some(buffer.items(schema, 1).into_iter().filter_map(named).collect())
 }
 
@@ -29,6 +43,15 @@ fn unit(buffer: &Buffer, field: usize) -> Option<String> {
     let pairs = buffer.items(field, 6);
     let pair = pairs.into_iter().find(|&pair| buffer.text(pair, 0).is_some_and(|name| super::names_unit(&name)))?;
     buffer.text(pair, 1)
+}
+
+/// The unit of a field of time differences.
+fn duration(buffer: &Buffer, field: usize) -> Option<Unit> {
+    let kind = buffer.number::<1>(buffer.field(field, 2)?).filter(|kind| *kind == DURATION);
+    let table = kind.and_then(|_| buffer.inner(field, 3))?;
+    // milliseconds are not written
+    let unit = buffer.field(table, 0).map_or(Some(1), |at| buffer.number::<2>(at))?;
+    Some(Unit { unit: (*DURATION_UNITS.get(unit)?).to_owned(), of_duration: true })
 }
 
 /// Tables that refer to one another by their distances.

@@ -4,6 +4,7 @@
 //!   digits, columns in structs (`/outer.inner`). Missing values are NaN. Lists and texts are remarks.
 //! - A column of moments is an axis: seconds since its first moment, which is when the recording began. Moments count
 //!   whole parts of a second, so that the differences are exact; as seconds since 1970 they would be rounded.
+//! - A column of time differences (Arrow) is an axis of times.
 //! - The index that pandas saves as `__index_level_0__` is `/index`, an axis.
 //! - Units from the metadata of a field, `unit` or `units`, which Arrow keeps in a text of the file. Rates from texts
 //!   of the file that are named like one (`sample_rate_hz`, `fs`, `dt`, ...), else from columns of times.
@@ -33,7 +34,7 @@ use crate::budget::most_inflated;
 use crate::calendar::date_of;
 use crate::opened::Opened;
 use crate::rate::{Clue, agreed_rate};
-use crate::{Contents, Format, FormatError, FoundChannel, Row};
+use crate::{Contents, Format, FormatError, FoundChannel, Number, Row};
 use column::Column;
 use footer::{Footer, MAGIC, What};
 
@@ -88,7 +89,7 @@ struct Found<'a> {
     /// Bytes that the samples may still come to.
     left: u64,
     /// Units by the names of columns.
-    units: HashMap<String, String>,
+    units: HashMap<String, arrow_schema::Unit>,
     /// How often each location is wanted.
     locations: HashMap<String, usize>,
     channels: Vec<FoundChannel>,
@@ -151,7 +152,9 @@ impl<'a> Found<'a> {
             self.remark(format!("{location}: 64-bit integers beyond 2^53 are rounded to float64"));
         }
         let own = chunks.iter().find_map(|chunk| chunk.unit.clone());
-        let unit = own.or_else(|| self.units.get(&name).cloned()).unwrap_or_default();
+        let of_field = self.units.get(&name);
+        let of_duration = number == Number::I64 && of_field.is_some_and(|unit| unit.of_duration);
+        let unit = own.or_else(|| of_field.map(|unit| unit.unit.clone())).unwrap_or_default();
         let mut column = Column {
             file: self.file.pinned().clone(),
             name: location.clone(),
@@ -175,7 +178,7 @@ impl<'a> Found<'a> {
         self.channels.push(FoundChannel {
             unit,
             scale_factor,
-            is_axis: matches!(what, What::Moments { .. }),
+            is_axis: of_duration || matches!(what, What::Moments { .. }),
             ..FoundChannel::new(location, samples, number.name(), Arc::new(column))
         });
         Ok(())
@@ -206,7 +209,7 @@ impl<'a> Found<'a> {
 
     /// The rate that texts of the file state.
     fn rate(&mut self, texts: &[(String, String)]) {
-        let clue = |(name, text): &(String, String)| Clue::of(name, name, text.trim().parse().ok()?);
+        let clue = |(name, text): &(String, String)| Clue::of_text(name, name, text);
         let clues: Vec<Clue> = texts.iter().filter_map(clue).collect();
         if clues.is_empty() {
             return;

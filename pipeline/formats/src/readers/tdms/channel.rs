@@ -8,7 +8,7 @@ use super::walk::Recorded;
 use crate::facts::BEGINS_LATER;
 use crate::number::Order;
 use crate::pinned::Pinned;
-use crate::rate::agreed_rate;
+use crate::rate::{Clue, agreed_rate, agreed_start};
 use crate::{Contents, FoundChannel};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -24,7 +24,8 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
     let started_at = began.or(stated).and_then(|stamp| stamp.iso()).unwrap_or_default();
     let scalings = scalings(&objects);
     let locations = locations(&objects);
-    let named: Vec<(Option<f64>, Option<String>)> = (0..objects.len()).map(|at| named_rate(at, &objects)).collect();
+    let named: Vec<(Said, Said)> =
+        (0..objects.len()).map(|at| (named_rate(at, &objects), named_start(at, &objects))).collect();
     let mut channels = Vec::new();
     for (((object, scaling), location), named) in objects.iter_mut().zip(scalings).zip(locations).zip(named) {
         if object.streams.is_empty() {
@@ -36,15 +37,17 @@ pub(super) fn contents(recorded: Recorded, pinned: &Pinned) -> Contents {
         match scaling.and_then(|scaling| channel(object, scaling, &location, pinned, &mut remarks)) {
             Ok(mut channel) => {
                 if channel.sample_rate_hz.is_none() {
-                    channel.sample_rate_hz = named.0;
-                    remarks.extend(named.1.filter(|remark| !remarks.contains(remark)));
+                    channel.sample_rate_hz = named.0.0;
+                    remarks.extend(named.0.1.filter(|remark| !remarks.contains(remark)));
                 }
                 channel.start_s = match (object.timing.began, began) {
                     (Some(own), Some(first)) => Some(own.seconds_since(first)),
-                    // of channels without stamps the offsets alone tell
-                    (None, None) => Some(object.timing.offset_s),
+                    // of channels without stamps the offsets alone tell, or a number that is named so
+                    (None, None) if named.1 == (None, None) => Some(object.timing.offset_s),
+                    (None, None) => named.1.0,
                     _ => None,
                 };
+                remarks.extend(named.1.1.filter(|remark| !remarks.contains(remark)));
                 if let Some(later) = channel.start_s.filter(|start| *start != 0.0) {
                     remarks.push(format!("{location} begins {later} {BEGINS_LATER}"));
                 }
@@ -113,19 +116,33 @@ fn channel(
     })
 }
 
-/// The rate that a property named like one states where there is no waveform: of the channel, else of its group, else of
-/// the file; and what to say of it.
-fn named_rate(at: usize, objects: &[Object]) -> (Option<f64>, Option<String>) {
+/// A rate or a start, and what to say of it.
+type Said = (Option<f64>, Option<String>);
+
+/// The rate that a property named like one states where there is no waveform.
+fn named_rate(at: usize, objects: &[Object]) -> Said {
     let none = (None, None);
     let Some(object) = objects.get(at) else { return none };
     if object.streams.is_empty() || timing::increment_s(&object.properties).is_some() || object.timing.uneven {
         return none;
     }
+    let said = |clues: &[Clue]| clues.iter().any(Clue::is_of_rate).then(|| agreed_rate(clues));
+    nearest(object, objects, said).unwrap_or(none)
+}
+
+/// The start that a property named like one states where there is no offset of a waveform.
+fn named_start(at: usize, objects: &[Object]) -> Said {
+    let offset = |object: &Object| object.properties.number("wf_start_offset").is_some();
+    let object = objects.get(at).filter(|object| !object.streams.is_empty() && !offset(object));
+    object.and_then(|object| nearest(object, objects, agreed_start)).unwrap_or_default()
+}
+
+/// What the properties of the channel say, else those of its group, else those of the file.
+fn nearest<T>(object: &Object, objects: &[Object], said: impl Fn(&[Clue]) -> Option<T>) -> Option<T> {
     let group = group_and_channel(&object.path).map(|(group, _)| format!("/'{}'", group.replace('\'', "''")));
     let around = [Some(object.path.clone()), group, Some("/".to_owned())];
     let clues = |path: String| objects.iter().find(|o| o.path == path).map(|o| o.properties.clues(&path));
-    let nearest = around.into_iter().flatten().filter_map(clues).find(|clues| !clues.is_empty());
-    nearest.map_or(none, |clues| agreed_rate(&clues))
+    around.into_iter().flatten().filter_map(clues).find_map(|clues| said(&clues))
 }
 
 /// The samples that go into the scaling: those of the scaler it names, else the first ones.

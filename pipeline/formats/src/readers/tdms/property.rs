@@ -55,16 +55,17 @@ impl Properties {
         }
     }
 
-    /// What is named like a sampling rate; a number may be written as text.
+    /// What is named like a sampling rate or a start; a number may be written as text, with its unit.
     pub(super) fn clues(&self, location: &str) -> Vec<Clue> {
-        let value = |value: &Value| match value {
-            Value::Number(number) => Some(*number),
-            Value::Text(text) => crate::text::number(text),
-            _ => None,
-        };
         let unit = |name: &str| unit_names(name).into_iter().find_map(|name| self.text(&name)).unwrap_or_default();
         let clue = |(name, found): (&String, &Value)| {
-            Some(Clue::of(name, &format!("{location}@{name}"), value(found)?)?.in_unit(unit(name)))
+            let location = format!("{location}@{name}");
+            let clue = match found {
+                Value::Number(number) => Clue::of(name, &location, *number),
+                Value::Text(text) => Clue::of_text(name, &location, text),
+                _ => None,
+            };
+            Some(clue?.in_unit(unit(name)))
         };
         self.0.iter().filter_map(clue).collect()
     }

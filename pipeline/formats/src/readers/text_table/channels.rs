@@ -4,6 +4,7 @@ use super::Parsed;
 use super::clocks::{Clock, clocks, copies};
 use super::column::Column;
 use super::plain::Rows;
+use super::stated::Known;
 use super::titles::{self, Title};
 use super::units;
 use crate::FoundChannel;
@@ -145,7 +146,7 @@ fn rises(values: &[f64]) -> bool {
 /// The first column of numbers, if it has no title and steps by the interval that the header states (Tektronix TDS:
 /// behind three columns of the header).
 fn stepping_as_stated(rows: &Rows, titles: &[Title]) -> Option<usize> {
-    let step = rows.stated.step().ok()??.seconds;
+    let step = rows.stated.step().ok()?.filter(|step| step.known != Known::Count)?.seconds;
     let is_value = |column: &&Column| column.numbers() > 1 && no_samples(column, rows.count).is_none();
     let at = rows.columns.iter().position(|column| is_value(&column))?;
     let untitled = titles.get(at).is_some_and(|title| title.name.is_empty() && title.unit.is_empty());

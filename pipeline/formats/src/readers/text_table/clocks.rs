@@ -5,14 +5,17 @@
 
 use super::column::Column;
 use super::plain::Rows;
-use super::stated::Step;
+use super::stated::{Known, Step};
 use super::titles::{self, Title};
 use super::units;
 use crate::evenness::{Stretches, of_gaps};
-use crate::facts::{AS_RATE, KNOWN_TO, TAKEN_AS_SECONDS};
+use crate::facts::{AS_RATE, KNOWN_TO, TAKEN_AS_HERTZ, TAKEN_AS_SECONDS};
 use crate::guess::why_no_seconds;
-use crate::rate::{of_step, rate_of_interval};
+use crate::rate::{INTERVAL_UNITS, ONE_CLOCK, brief_number, fewest_digits, of_step, rate_of_interval, rates_agree};
 use std::collections::HashMap;
+
+/// Rounding of the arithmetic that gives a step, relative.
+const ROUNDING: f64 = 1e-12;
 
 /// When the samples of a column were taken.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -79,8 +82,7 @@ pub(super) fn clocks(
     times: &[usize],
     remarks: &mut Vec<String>,
 ) -> Clocks {
-    let stated = rows.stated.step().map(|step| step.cloned());
-    let stated = stated.unwrap_or_else(|disagree| {
+    let stated = rows.stated.step().unwrap_or_else(|disagree| {
         remarks.push(disagree);
         None
     });
@@ -91,17 +93,27 @@ pub(super) fn clocks(
         return Clocks { all: vec![clock], of: vec![0; count], none: Clock::default() };
     }
     let table = Table { rows, titles, locations, stated: stated.as_ref() };
-    let groups = groups(times, &copies, |at| rows.columns.get(at).is_some_and(|column| column.numbers() > 1));
+    let has_values = |at: usize| rows.columns.get(at).is_some_and(|column| column.numbers() > 1);
+    let groups = groups(times, &copies, titles, has_values);
     let all: Vec<Clock> = groups.iter().map(|columns| table.clock(columns, remarks)).collect();
     let of = (0..count).map(|number| owner(number, titles, &all, &groups, &copies)).collect();
     Clocks { all, of, none: Clock::default() }
 }
 
-/// Columns of times between which no column of values lies.
-fn groups(times: &[usize], copies: &HashMap<usize, usize>, has_values: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+/// Columns of times between which no column of values lies, and which are not named for different ones.
+fn groups(
+    times: &[usize],
+    copies: &HashMap<usize, usize>,
+    titles: &[Title],
+    has_values: impl Fn(usize) -> bool,
+) -> Vec<Vec<usize>> {
+    let values = || titles.iter().enumerate().filter(|(at, _)| !times.contains(at)).map(|(_, title)| title);
+    let names_one = |label: &String| values().any(|title| title.name.to_lowercase().starts_with(label.as_str()));
+    let label = |at: usize| titles::time_of(titles.get(at)?)?.filter(names_one);
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for &at in times.iter().filter(|at| !copies.contains_key(at)) {
-        let beside = |last: usize| (last + 1..at).all(|between| !has_values(between));
+        let one_label = |last: usize| label(last) == label(at);
+        let beside = |last: usize| one_label(last) && (last + 1..at).all(|between| !has_values(between));
         match groups.last_mut().filter(|group| group.last().is_some_and(|last| beside(*last))) {
             Some(group) => group.push(at),
             None => groups.push(vec![at]),
@@ -152,10 +164,35 @@ impl Table<'_> {
             found.iter().position(|(_, clock, _)| clock.rate_hz.is_some() && (guessed || !clock.guessed))
         };
         let best = gives(false).or_else(|| gives(true)).unwrap_or(0);
+        if let Some(disagree) = self.disagreement(&found, best) {
+            remarks.push(disagree);
+            return Clock { columns: columns.to_vec(), ..Clock::default() };
+        }
         let chosen = found.into_iter().nth(best);
         let Some((axis, clock, said)) = chosen else { return Clock { columns: columns.to_vec(), ..Clock::default() } };
         remarks.extend(said);
         Clock { axis: Some(axis), columns: columns.to_vec(), label, ..clock }
+    }
+
+    /// What to say where another column, whose unit is as certain as that of the best, gives another rate.
+    fn disagreement(&self, found: &[(usize, Clock, Vec<String>)], best: usize) -> Option<String> {
+        let (at, first, _) = found.get(best)?;
+        let rate = first.rate_hz?;
+        let differs = |(_, clock, _): &&(usize, Clock, Vec<String>)| {
+            let agrees = |other: f64| {
+                let one_clock = (other / rate - 1.0).abs() <= ONE_CLOCK;
+                one_clock || rates_agree(other, rate, first.relative_std + clock.relative_std)
+            };
+            clock.guessed == first.guessed && clock.rate_hz.is_some_and(|other| !agrees(other))
+        };
+        let (other, second, _) = found.iter().find(differs)?;
+        let name = |at: usize| self.locations.get(at).map_or("", String::as_str);
+        Some(format!(
+            "no sample rate: {} has {rate} samples per second, {} beside it {}: they disagree",
+            name(*at),
+            name(*other),
+            second.rate_hz.unwrap_or_default()
+        ))
     }
 
     /// What one column of times says, and remarks.
@@ -167,15 +204,25 @@ impl Table<'_> {
             let why = format!("{location} is in «{}», no unit of time that is known: no sample rate", title.unit);
             return Some((Clock::default(), vec![why]));
         }
-        let seconds = unit_s.unwrap_or(1.0);
         if let Some(step) = self.stated
-            && let Some(clock) = as_stated(column, starts, step, seconds)
+            && let Some(clock) = as_stated(column, starts, step, unit_s)
         {
-            let guess = if unit_s.is_none() { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
+            let guess = if clock.guessed { format!(" {TAKEN_AS_SECONDS}") } else { String::new() };
             let first = column.values.first().copied().unwrap_or(0.0);
             let said =
                 format!("{location}{guess} runs evenly from {first}: {AS_RATE}; the header says «{}»", step.words);
             return Some((clock, vec![said]));
+        }
+        let counts = |step: &&Step| step.known != Known::Count && unit_s.is_none() && counts_samples(column, title);
+        if let Some(step) = self.stated.filter(counts) {
+            let (rate, relative_std) = rate_of_interval(step.seconds, step.unit_s);
+            let start_s = column.values.first().map(|first| first * step.seconds);
+            let guessed = step.known == Known::Guessed;
+            let said = format!("{location} counts the samples: {AS_RATE}; the header says «{}»", step.words);
+            return Some((
+                Clock { rate_hz: Some(rate), relative_std, guessed, start_s, ..Clock::default() },
+                vec![said],
+            ));
         }
         let times = column.times();
         // the times may go on over headers among the rows
@@ -196,8 +243,13 @@ impl Table<'_> {
     fn of_even(&self, at: usize, found: &Stretches, (unit_s, goes_on): (Option<f64>, bool)) -> (Clock, Vec<String>) {
         let location = self.locations.get(at).map_or("", String::as_str);
         let (even, seconds) = (found.even, unit_s.unwrap_or(1.0));
-        if let Some(Step { words, .. }) = self.stated {
-            let why = format!("no sample rate: {location} steps by {:e}, the header says «{words}»", even.step);
+        let other_unit =
+            |step: &&Step| step.known != Known::Stated && unit_s.is_some() && step.fits(even.step * seconds);
+        if let Some(Step { words, .. }) = self.stated.filter(|step| !other_unit(step)) {
+            let step = brief_number(fewest_digits(even.step, ROUNDING));
+            let unit = self.titles.get(at).map_or("", |title| title.unit.as_str());
+            let step = format!("{step} {unit}");
+            let why = format!("no sample rate: {location} steps by {}, the header says «{words}»", step.trim_end());
             return (Clock::default(), vec![why]);
         }
         if let Some(why) = why_no_seconds(unit_s, "", even.first, even.step) {
@@ -225,18 +277,33 @@ impl Table<'_> {
     }
 }
 
-/// The clock of an interval that the header states, if a column of times agrees with it.
-fn as_stated(column: &Column, starts: &[usize], stated: &Step, seconds: f64) -> Option<Clock> {
-    let (step, times) = (stated.seconds / seconds, column.times());
-    let even = times.even_between(starts, Some(step)).ok();
-    if even.is_none() && !agrees(column, step) {
-        return None;
-    }
+/// Whether a column is a counter: an index that rises by one.
+fn counts_samples(column: &Column, title: &Title) -> bool {
+    title.name.eq_ignore_ascii_case("index") && column.times().even(None).is_ok_and(|even| even.step == 1.0)
+}
+
+/// The clock of an interval that the header states, if a column of times agrees with it: in its unit, or, where it has
+/// none, in that unit of time in which it does.
+fn as_stated(column: &Column, starts: &[usize], stated: &Step, unit_s: Option<f64>) -> Option<Clock> {
+    let times = column.times();
+    let one_unit = |seconds: f64| {
+        let step = stated.seconds / seconds;
+        let even = times.even_between(starts, Some(step)).ok();
+        (even.is_some() || agrees(column, step)).then_some((seconds, step, even))
+    };
+    let units = match (unit_s, stated.known) {
+        (Some(unit_s), Known::Stated | Known::Guessed) => vec![unit_s],
+        (None, Known::Stated) => INTERVAL_UNITS.to_vec(),
+        (None, Known::Guessed) => vec![1.0],
+        (_, Known::Count) => Vec::new(),
+    };
+    let (seconds, step, even) = units.into_iter().find_map(one_unit)?;
     let (rate, relative_std) = rate_of_interval(stated.seconds, stated.unit_s);
     let first = column.values.first().copied();
     Some(Clock {
         rate_hz: Some(rate),
         relative_std,
+        guessed: unit_s.is_none() && stated.known == Known::Guessed,
         start_s: even.map(|even| even.first).or(first).map(|first| first * seconds),
         goes_on: times.even(Some(step)).is_ok(),
         ..Clock::default()
@@ -278,13 +345,23 @@ fn without_times(
     let even = counter.and_then(|column| column.times().even_between(&rows.starts, None).ok());
     let first = locations.first().map_or("", String::as_str);
     match (stated, even) {
-        (Some(Step { seconds, unit_s, words }), even) => {
+        (Some(Step { known: Known::Count, words, .. }), _) => {
+            remarks.push(format!("no sample rate: the header says «{words}», a whole number without a unit"));
+            Clock::default()
+        }
+        (Some(Step { seconds, unit_s, known, is_rate, words }), even) => {
             let counts = even.is_some_and(|even| even.step == 1.0);
             let counter =
                 if counts { format!("; {first} counts the samples and is no channel") } else { String::new() };
-            remarks.push(format!("the sample rate is taken from the header: «{words}»{counter}"));
+            let guessed = known == Known::Guessed;
+            let guess = match (guessed, is_rate) {
+                (false, _) => String::new(),
+                (true, true) => format!(" {TAKEN_AS_HERTZ}"),
+                (true, false) => format!(" {TAKEN_AS_SECONDS}"),
+            };
+            remarks.push(format!("the sample rate is taken from the header: «{words}»{guess}{counter}"));
             let (rate, relative_std) = rate_of_interval(seconds, unit_s);
-            Clock { rate_hz: Some(rate), relative_std, ..axis(counts.then_some(0)) }
+            Clock { rate_hz: Some(rate), relative_std, guessed, ..axis(counts.then_some(0)) }
         }
         (None, Some(even)) => {
             let rate = of_step(even.step);

@@ -23,12 +23,13 @@ pub(super) fn titles(lines: &[&str], sniffed: &Sniffed) -> Vec<Title> {
     }
     let units_only = above_units || titles::are_units(&lowest);
     let names = rows.next().filter(|_| units_only);
+    let of_row = titles::of_row(&lowest);
     let title = |(column, field): (usize, &String)| {
         let name = names.as_ref().map(|names| names.get(column).map_or("", |name| number::bare(name)));
         match name {
             Some(name) => Title { name: name.to_owned(), unit: titles::unit_of(field) },
             None if units_only => Title { name: number::bare(field).to_owned(), unit: titles::unit_of(field) },
-            None => titles::split_unit(field),
+            None => of_row.get(column).cloned().unwrap_or_default(),
         }
     };
     let mut found: Vec<Title> = lowest.iter().enumerate().map(title).collect();

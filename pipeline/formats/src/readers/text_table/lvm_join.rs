@@ -5,6 +5,7 @@ use super::lvm::{Section, X};
 use super::lvm_header::{FileHeader, moment};
 use super::{Parsed, titles};
 use crate::FoundChannel;
+use crate::evenness::{Stretches, of_gaps};
 use crate::printed::Printed;
 use crate::rate::rate_of_interval;
 use std::collections::{HashMap, HashSet};
@@ -30,13 +31,25 @@ pub(super) struct Joined {
 struct Channel {
     title: String,
     unit: String,
-    /// Seconds between samples, and one unit of their last place.
-    step: Option<(f64, f64)>,
+    step: Option<Step>,
     values: Vec<f64>,
     gaps: Vec<usize>,
     /// When the first and the sample behind the last were taken.
     start: Option<Instant>,
     end: Option<Instant>,
+}
+
+/// Seconds between samples.
+#[derive(Debug, Clone, Default)]
+struct Step {
+    seconds: f64,
+    /// One unit of the last place that it is stated to; 0 where it is that of times.
+    unit_s: f64,
+    /// Standard error of the one of times, relative.
+    relative_std: f64,
+    /// Rows of the section before which the times jump, and from its first sample to the one behind its last.
+    gaps: Vec<usize>,
+    lasted_s: Option<f64>,
 }
 
 /// Whole seconds since 1970 (0 if the file has no date) and the rest.
@@ -73,10 +86,11 @@ impl Joined {
             let unit = section.tags.field("Y_Unit_Label", at).map(str::to_owned);
             let unit = unit.unwrap_or_else(|| titles::split_unit(title).unit);
             let start = start(&section, at, axis_column, file);
-            let key = (title.clone(), *number, unit, step.map(|(s, _)| format!("{s:.6e}")));
+            let key = (title.clone(), *number, unit, step.as_ref().map(|step| format!("{:.6e}", step.seconds)));
+            let is_uneven = step.is_none();
             self.append(key, step, column, start, section.continued);
             // Channels share an X column: it is given once.
-            let uneven = x.zip(axis_column).filter(|(x, _)| step.is_none() && given.insert(*x));
+            let uneven = x.zip(axis_column).filter(|(x, _)| is_uneven && given.insert(*x));
             if let Some((x, times)) = uneven {
                 let unit = if is_time(&section, at) { "s" } else { "" };
                 let key = (X.to_owned(), x, unit.to_owned(), None);
@@ -86,25 +100,29 @@ impl Joined {
         }
     }
 
-    fn append(&mut self, key: Key, step: Option<(f64, f64)>, column: &Column, start: Option<Instant>, continued: bool) {
+    fn append(&mut self, key: Key, step: Option<Step>, column: &Column, start: Option<Instant>, continued: bool) {
         let next = self.channels.len();
         let number = *self.numbers.entry(key.clone()).or_insert(next);
         if number == next {
             let (title, _, unit, _) = key;
+            let step = step.clone();
             self.channels.push(Channel { title, unit, step, values: Vec::new(), gaps: Vec::new(), start, end: None });
         }
         let Some(channel) = self.channels.get_mut(number) else { return };
-        let goes_on = match (channel.end, start, channel.step) {
+        let goes_on = match (channel.end, start, &channel.step) {
             // Half a step: less is no sample, and stamps are rounded.
-            (Some(end), Some(start), Some((step, _))) => start.since(end).abs() <= 0.5 * step,
+            (Some(end), Some(start), Some(step)) => start.since(end).abs() <= 0.5 * step.seconds,
             // A row behind a blank line, of which nothing tells when it was taken.
             _ => continued,
         };
         if !goes_on && !channel.values.is_empty() {
             channel.gaps.push(channel.values.len());
         }
+        let step = step.unwrap_or_default();
+        channel.gaps.extend(step.gaps.iter().map(|row| row + channel.values.len()));
         channel.values.extend_from_slice(&column.values);
-        let lasted = channel.step.map(|(step, _)| step * column.values.len() as f64);
+        let evenly = || Some(channel.step.as_ref()?.seconds * column.values.len() as f64);
+        let lasted = step.lasted_s.or_else(evenly);
         channel.end = start.zip(lasted).map(|(start, lasted)| Instant(start.0, start.1 + lasted));
     }
 
@@ -118,7 +136,10 @@ impl Joined {
         // stamps count from 1970: the seconds of the first are left out, so that the rest keeps its digits
         let epoch = self.channels.iter().filter_map(|channel| channel.start.map(|start| start.0)).min().unwrap_or(0);
         let found = |(channel, location): (Channel, String)| {
-            let rate = channel.step.map(|(step, unit)| rate_of_interval(step, unit));
+            let rate = channel.step.as_ref().map(|step| {
+                let (rate, std) = rate_of_interval(step.seconds, step.unit_s);
+                (rate, std.max(step.relative_std))
+            });
             FoundChannel {
                 unit: channel.unit,
                 long_name: channel.title.clone(),
@@ -167,7 +188,7 @@ fn step(
     x: Option<&Column>,
     file: &FileHeader,
     remark: &mut impl FnMut(String),
-) -> Option<(f64, f64)> {
+) -> Option<Step> {
     let title = section.titles.get(at).map_or("", String::as_str);
     if !is_time(section, at) {
         let dimension = section.tags.field("X_Dimension", at).unwrap_or_default();
@@ -179,7 +200,8 @@ fn step(
     let printed = || {
         let mut printed = Printed::default();
         printed.see(section.tags.field("Delta_X", at).unwrap_or_default());
-        stated.map(|step| (step, printed.unit_of(step)))
+        let of = |seconds: f64| Step { seconds, unit_s: printed.unit_of(seconds), ..Step::default() };
+        stated.map(of)
     };
     let Some(x) = x else {
         if let (Some(odd), None) = (delta, stated) {
@@ -187,10 +209,16 @@ fn step(
         }
         return printed();
     };
+    let jumping = |step: Step, found: &Stretches| {
+        let last = x.values.last().zip(x.values.first()).map(|(last, first)| last - first);
+        let lasted_s = last.filter(|_| !found.gaps.is_empty()).map(|last| last + step.seconds);
+        Step { gaps: found.gaps.clone(), lasted_s, ..step }
+    };
     let coarse = |step: f64| x.values.last().is_some_and(|last| x.printed.unit_of(*last) > 0.25 * step);
     if let Some(step) = stated {
-        if x.times().even(stated).is_ok() {
-            return printed();
+        if let Ok(found) = x.times().stretches(stated) {
+            of_gaps(title, &found).into_iter().for_each(&mut *remark);
+            return printed().map(|step| jumping(step, &found));
         }
         if coarse(step) {
             remark(format!("{title}: its X column is printed too coarsely to check Delta_X = {step} s, which is used"));
@@ -198,16 +226,20 @@ fn step(
         }
     }
     let line = section.line;
-    match (x.times().even(None), stated) {
-        (Ok(even), None) => Some((even.step, 0.0)),
-        (Ok(even), Some(stated)) => {
-            remark(format!(
-                "{title}: Delta_X is {stated} s, its X column has steps of {} s, which are used",
-                even.step
-            ));
-            Some((even.step, 0.0))
+    match x.times().stretches(None) {
+        Ok(found) => {
+            let even = found.even;
+            if let Some(stated) = stated {
+                remark(format!(
+                    "{title}: Delta_X is {stated} s, its X column has steps of {} s, which are used",
+                    even.step
+                ));
+            }
+            of_gaps(title, &found).into_iter().for_each(remark);
+            let step = Step { seconds: even.step, relative_std: even.relative_std(), ..Step::default() };
+            Some(jumping(step, &found))
         }
-        (Err(why), _) => {
+        Err(why) => {
             remark(format!("{title} has no sample rate: its X column (from line {line}) is not even, {why}"));
             None
         }

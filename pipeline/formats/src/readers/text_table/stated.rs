@@ -6,7 +6,8 @@
 use super::number;
 use super::units::{hertz, seconds};
 use crate::printed::Printed;
-use crate::text::brief;
+use crate::rate::{AGREE, is_count, unit_that_fits};
+use crate::text::{self, brief};
 
 /// Keys whose value is the time between two samples: Tektronix and Siglent, Rigol, LabVIEW, Yokogawa, and plain words.
 const INTERVALS: [&str; 14] = [
@@ -25,9 +26,36 @@ const INTERVALS: [&str; 14] = [
     "sampling period",
     "dt",
 ];
+/// Of these and of the rates those that are in seconds or hertz by convention: of instruments, and symbols. Of the others
+/// without a unit this is a guess.
+const CONVENTIONAL: [&str; 11] = [
+    "increment",
+    "tinc",
+    "xincr",
+    "xincrement",
+    "x increment",
+    "delta t",
+    "delta_x",
+    "hresolution",
+    "dt",
+    "fs",
+    "samples per second",
+];
 /// Keys whose value is a rate.
-const RATES: [&str; 7] =
-    ["sampling frequency", "sampling rate", "sample rate", "sample frequency", "samplerate", "sample_rate", "fs"];
+const RATES: [&str; 8] = [
+    "sampling frequency",
+    "sampling rate",
+    "sample rate",
+    "sample frequency",
+    "samplerate",
+    "sample_rate",
+    "samples per second",
+    "fs",
+];
+/// Others are called so, too: a rate of samples has the unit of one.
+const PERHAPS_RATES: [&str; 2] = ["rate", "sampling"];
+/// Keys whose value is the unit of the rate or interval in the line above; also behind the name of such a key.
+const UNITS_OF_STEPS: [&str; 3] = ["units", "unit", "einheit"];
 const TIME_UNITS: [&str; 3] = ["horizontal units", "x units", "xunits"];
 const VALUE_UNITS: [&str; 3] = ["vertical units", "y units", "yunits"];
 /// Keys whose value is the name of a channel.
@@ -35,8 +63,6 @@ const SOURCES: [&str; 1] = ["source"];
 /// Keys that stand in a row of titles without being the title of a column.
 const OTHERS: [&str; 2] = ["start", "t0"];
 
-/// Two statements of an interval agree if they differ by less: rates are printed with six digits and more.
-const AGREE: f64 = 1e-5;
 /// More statements than this say nothing new.
 const MOST: usize = 1000;
 
@@ -44,6 +70,8 @@ const MOST: usize = 1000;
 enum Key {
     Interval,
     Rate,
+    PerhapsRate,
+    StepUnit,
     TimeUnit,
     ValueUnit,
     Source,
@@ -56,17 +84,65 @@ pub(super) struct Step {
     pub(super) seconds: f64,
     /// One unit of its last place; 0 where a rate is stated instead.
     pub(super) unit_s: f64,
+    pub(super) known: Known,
+    /// Whether a rate is stated.
+    pub(super) is_rate: bool,
     /// The words that say so.
     pub(super) words: String,
+}
+
+/// How the unit of an interval is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Known {
+    /// It is stated, or the key is in seconds or hertz by convention.
+    Stated,
+    /// It is none, and taken as seconds or hertz.
+    Guessed,
+    /// It is none, and the interval a whole number: seconds, or anything else.
+    Count,
+}
+
+/// A number that is stated, in the unit that stands at it or behind it; empty if none does.
+#[derive(Debug, Clone)]
+struct Statement {
+    is_rate: bool,
+    conventional: bool,
+    number: f64,
+    last_place: f64,
+    unit: String,
+    words: String,
+}
+
+impl Statement {
+    /// The interval, where `step_unit` and `time_unit` are stated elsewhere. None in a unit of something else.
+    fn step(&self, step_unit: &str, time_unit: &str) -> Option<Step> {
+        let time_unit = if self.is_rate { "" } else { time_unit };
+        let of_one = |unit: &&str| hertz(unit).is_some() || seconds(unit).is_some();
+        let elsewhere = [step_unit, time_unit].into_iter().find(of_one).unwrap_or_default();
+        let unit = if self.unit.is_empty() { elsewhere } else { &self.unit };
+        let as_rate = |hertz: f64| (self.number * hertz).recip();
+        let (seconds, unit_s, is_rate) = match (hertz(unit), seconds(unit)) {
+            (Some(hertz), _) => (as_rate(hertz), 0.0, true),
+            (None, Some(seconds)) => (self.number * seconds, self.last_place * seconds, false),
+            (None, None) if !unit.is_empty() => return None,
+            (None, None) if self.is_rate => (as_rate(1.0), 0.0, true),
+            (None, None) => (self.number, self.last_place, false),
+        };
+        let known = match unit.is_empty() {
+            true if !is_rate && is_count(self.number) => Known::Count,
+            true if !self.conventional => Known::Guessed,
+            _ => Known::Stated,
+        };
+        Some(Step { seconds, unit_s, known, is_rate, words: self.words.clone() })
+    }
 }
 
 /// What was stated so far.
 #[derive(Debug, Default)]
 pub(super) struct Stated {
-    /// Seconds between samples, one unit of their last place, and the words that say so.
-    steps: Vec<Step>,
-    /// Words that state an interval or a rate which is none.
-    odd: Option<String>,
+    statements: Vec<Statement>,
+    /// The unit of rates and intervals that have none.
+    step_unit: String,
     /// The unit of the axis of time; empty if none is stated.
     pub(super) time_unit: String,
     /// Units and the fields they stand in.
@@ -88,8 +164,12 @@ impl Stated {
                 None => behind.take_while(|(_, field)| !number::bare(field).is_empty()).collect(),
             };
             let is_number = |value: &(usize, &str)| quantity(value.1, decimal).is_some();
-            if matches!(key, Key::Interval | Key::Rate) && !values.iter().any(is_number) {
+            let of_step = matches!(key, Key::Interval | Key::Rate | Key::PerhapsRate);
+            if of_step && !values.iter().any(is_number) {
                 values = below.get(at).map(|field| (at, *field)).into_iter().collect();
+            }
+            if of_step && self.step_unit.is_empty() {
+                self.step_unit = unit_below(below).unwrap_or_default();
             }
             self.take(key, name, &values, decimal);
         }
@@ -100,59 +180,95 @@ impl Stated {
             .rsplit_once(['(', '['])
             .map(|(_, unit)| unit.trim_matches([')', ']', ' ', '=', ':']))
             .unwrap_or_default();
-        for (at, value) in values {
+        for (number_of, (at, value)) in values.iter().enumerate() {
             match key {
                 Key::Source if self.sources.len() < MOST => self.sources.push(number::bare(value).to_owned()),
                 Key::Source | Key::Other => {}
                 Key::TimeUnit if self.time_unit.is_empty() => self.time_unit = unit_in(value),
                 Key::TimeUnit => {}
+                Key::StepUnit if self.step_unit.is_empty() => self.step_unit = unit_in(value),
+                Key::StepUnit => {}
                 Key::ValueUnit if self.value_units.len() < MOST => self.value_units.push((*at, unit_in(value))),
                 Key::ValueUnit => {}
-                Key::Interval | Key::Rate => {
+                Key::Interval | Key::Rate | Key::PerhapsRate => {
                     let Some((number, unit)) = quantity(value, decimal) else { continue };
-                    let unit = if unit.is_empty() { own_unit } else { unit };
+                    let behind = values.get(number_of + 1).map(|(_, field)| unit_in(field)).unwrap_or_default();
+                    let is_unit = |unit: &&str| hertz(unit).is_some() || seconds(unit).is_some();
+                    let first = [unit, own_unit].into_iter().find(|unit| !unit.is_empty());
+                    let unit = first.or(Some(behind.as_str()).filter(is_unit)).unwrap_or_default();
+                    let doubtful = key == Key::PerhapsRate && !is_unit(&unit);
+                    if doubtful || self.statements.len() >= MOST {
+                        continue;
+                    }
                     let mut printed = Printed::default();
                     printed.see(value);
-                    let last_place = printed.unit_of(number);
-                    let step = match (key, unit) {
-                        (Key::Rate, "") => Some((number.recip(), 0.0)),
-                        (Key::Rate, unit) => hertz(unit).map(|hertz| ((number * hertz).recip(), 0.0)),
-                        (_, "") => Some((number, last_place)),
-                        (_, unit) => seconds(unit).map(|seconds| (number * seconds, last_place * seconds)),
-                    };
-                    let words = || format!("{} {}", brief(bare_key(name), 40), brief(value.trim(), 40));
-                    match step.filter(|(step, _)| step.is_finite() && *step > 0.0) {
-                        Some((seconds, unit_s)) if self.steps.len() < MOST => {
-                            self.steps.push(Step { seconds, unit_s, words: words() });
-                        }
-                        None if step.is_some() && self.odd.is_none() => self.odd = Some(words()),
-                        _ => {}
-                    }
+                    self.statements.push(Statement {
+                        is_rate: key != Key::Interval,
+                        conventional: CONVENTIONAL.contains(&bare_key(name).to_lowercase().as_str()),
+                        number,
+                        last_place: printed.unit_of(number),
+                        unit: unit.to_owned(),
+                        words: format!("{} {}", brief(bare_key(name), 40), brief(value.trim(), 40)),
+                    });
                 }
             }
         }
     }
 
+    /// All intervals that are stated, those of a stated unit first.
+    fn steps(&self) -> (Vec<Step>, Option<&Statement>) {
+        let is_one = |step: &Step| step.seconds.is_finite() && step.seconds > 0.0;
+        let of = |statement: &Statement| statement.step(&self.step_unit, &self.time_unit);
+        let mut steps: Vec<Step> = self.statements.iter().filter_map(of).filter(is_one).collect();
+        steps.sort_by_key(|step| step.known);
+        let odd = self.statements.iter().find(|statement| of(statement).is_some_and(|step| !is_one(&step)));
+        (steps, odd)
+    }
+
     /// The words of a statement that is no interval, where no other statement is one.
     pub(super) fn odd(&self) -> Option<&str> {
-        self.odd.as_deref().filter(|_| self.steps.is_empty())
+        let (steps, odd) = self.steps();
+        odd.filter(|_| steps.is_empty()).map(|odd| odd.words.as_str())
     }
 
     /// The interval all statements agree on, in seconds, and the words of the first. Errors: what to say of
     /// statements that disagree.
-    pub(super) fn step(&self) -> Result<Option<&Step>, String> {
-        let Some(first) = self.steps.first() else { return Ok(None) };
-        match self.steps.iter().find(|step| (step.seconds - first.seconds).abs() > AGREE * first.seconds) {
+    pub(super) fn step(&self) -> Result<Option<Step>, String> {
+        let steps = self.steps().0;
+        let Some(first) = steps.first() else { return Ok(None) };
+        let agree = |step: &&Step| {
+            let same = (step.seconds - first.seconds).abs() <= AGREE * first.seconds;
+            same || (first.known == Known::Stated && step.known != Known::Stated && step.fits(first.seconds))
+        };
+        match steps.iter().find(|step| !agree(step)) {
             Some(other) => Err(format!("no sample rate: the header says «{}» and «{}»", first.words, other.words)),
-            None => Ok(Some(first)),
+            None => Ok(Some(first.clone())),
         }
     }
+}
+
+impl Step {
+    /// Whether this statement without a unit is of an interval that is stated elsewhere, in another unit.
+    pub(super) fn fits(&self, seconds: f64) -> bool {
+        unit_that_fits(self.seconds, seconds).is_some()
+    }
+}
+
+/// The unit in a line that states nothing else: `Unit: us`, or `Unit` and `us` in two fields.
+fn unit_below(below: &[&str]) -> Option<String> {
+    let first = below.iter().position(|field| !number::bare(field).is_empty())?;
+    let (name, inside) = split_value(below.get(first)?);
+    let value = inside.or_else(|| below.get(first + 1).copied())?;
+    let unit = unit_in(value);
+    let is_unit = hertz(&unit).is_some() || seconds(&unit).is_some();
+    (is_unit && UNITS_OF_STEPS.contains(&bare_key(name).to_lowercase().as_str())).then_some(unit)
 }
 
 /// Whether a field is a key: no title of a column.
 pub(super) fn is_key(field: &str) -> bool {
     // channels are titled by their sources
-    key(split_value(field).0).is_some_and(|key| key != Key::Source)
+    let (name, inside) = split_value(field);
+    key(name).is_some_and(|key| key != Key::Source && (key != Key::PerhapsRate || inside.is_some()))
 }
 
 fn key(name: &str) -> Option<Key> {
@@ -160,12 +276,18 @@ fn key(name: &str) -> Option<Key> {
     let keys = [
         (INTERVALS.as_slice(), Key::Interval),
         (&RATES, Key::Rate),
+        (&PERHAPS_RATES, Key::PerhapsRate),
         (&TIME_UNITS, Key::TimeUnit),
         (&VALUE_UNITS, Key::ValueUnit),
         (&SOURCES, Key::Source),
         (&OTHERS, Key::Other),
     ];
-    keys.into_iter().find(|(names, _)| names.contains(&name.as_str())).map(|(_, key)| key)
+    let find = |name: &str| keys.iter().find(|(names, _)| names.contains(&name)).map(|(_, key)| *key);
+    let of_unit = |end: &&str| {
+        let of = name.strip_suffix(*end).map(|of| of.trim_end_matches([' ', '_'])).and_then(find);
+        matches!(of, Some(Key::Interval | Key::Rate))
+    };
+    find(&name).or_else(|| UNITS_OF_STEPS.iter().any(|end| of_unit(&end)).then_some(Key::StepUnit))
 }
 
 /// A key without a unit in brackets and without `=` or `:` behind it.
@@ -187,12 +309,7 @@ fn split_value(field: &str) -> (&str, Option<&str>) {
 fn quantity(text: &str, decimal: char) -> Option<(f64, &str)> {
     let text = number::bare(text);
     let text = text.rsplit_once(':').map_or(text, |(_, behind)| behind).trim();
-    if let Some(number) = number::parse(text, decimal) {
-        return Some((number, ""));
-    }
-    let unit = text.trim_start_matches(|c: char| !c.is_alphabetic() || matches!(c, 'e' | 'E'));
-    let number = number::parse(text.strip_suffix(unit)?, decimal)?;
-    Some((number, unit.trim()))
+    text::quantity(text, |text| number::parse(text, decimal))
 }
 
 /// A unit, without the source that Siglent names (`CH1:V`) and without brackets.
@@ -226,6 +343,21 @@ mod tests {
         );
         assert_eq!(step(&[&["\"Sampling Frequency (Hz)=\"", "500000000", ""]]), Ok(Some(2e-9)));
         assert_eq!(step(&[&["fs: 2 kHz"]]), Ok(Some(5e-4)));
+        assert_eq!(step(&[&["Rate: 10 ms"]]), Ok(Some(0.01)));
+        assert_eq!(step(&[&["Rate", "10", "ms"]]), Ok(Some(0.01)));
+        assert_eq!(step(&[&["Sample interval: 100 Hz"]]), Ok(Some(0.01)));
+        assert_eq!(step(&[&["Rate: 72"]]), Ok(None));
+        for lines in [
+            [&["Sample period: 100"][..], &["Unit: us"][..]],
+            [&["Sample period", "100"], &["Unit", "us"]],
+            [&["Sample period", "100", "us"], &[""]],
+            [&["Sample period", "100"], &["Sample period unit", "us"]],
+            [&["Sample period: 100"], &["Horizontal Units: us"]],
+        ] {
+            assert_eq!(step(&lines), Ok(Some(100.0 * 1e-6)), "{lines:?}");
+        }
+        // a whole number without a unit may be in any
+        assert_eq!(step(&[&["Sample period: 100"], &["Rate: 10 kHz"]]), Ok(Some(1e-4)));
         assert_eq!(step(&[&["Time Scale (s/DIV) =", "1E-7"], &["Record Length", "2000"]]), Ok(None));
         assert!(step(&[&["dt", "1e-3"], &["fs", "2000"]]).is_err());
         assert_eq!(step(&[&["Sample Interval", "0"]]), Ok(None));

@@ -33,9 +33,7 @@ pub(super) fn split_unit(text: &str) -> Title {
             return Title { name: quoted(name).to_owned(), unit };
         }
     }
-    // `t/s`: no blanks round the stroke, which others use for ratios
-    let time = text.split_once('/').map(|(name, unit)| Title { name: name.to_owned(), unit: unit.to_owned() });
-    if let Some(time) = time.filter(|time| is_time(time) && units::seconds(&time.unit).is_some()) {
+    if let Some(time) = time_by_stroke(text) {
         return time;
     }
     // `in s` is a unit without a name
@@ -43,6 +41,27 @@ pub(super) fn split_unit(text: &str) -> Title {
         return Title { name: String::new(), unit };
     }
     Title { name: text.to_owned(), unit: String::new() }
+}
+
+/// `t/s`: no blanks round the stroke, which others use for ratios.
+fn time_by_stroke(text: &str) -> Option<Title> {
+    let (name, unit) = text.split_once('/')?;
+    let time = Title { name: name.to_owned(), unit: unit.to_owned() };
+    (is_time(&time) && units::seconds(unit).is_some()).then_some(time)
+}
+
+/// The titles of one row. Beside `t/s` another stroke stands before a unit, too: `a/V`.
+pub(super) fn of_row(fields: &[String]) -> Vec<Title> {
+    let strokes = fields.iter().any(|field| time_by_stroke(bare(field)).is_some());
+    let by_stroke = |title: &Title| {
+        let (name, unit) = title.name.split_once('/').filter(|_| strokes && title.unit.is_empty())?;
+        Some(Title { name: name.trim().to_owned(), unit: units::symbol(unit.trim())? })
+    };
+    let of = |field: &String| {
+        let title = split_unit(field);
+        by_stroke(&title).unwrap_or(title)
+    };
+    fields.iter().map(of).collect()
 }
 
 /// `"Weg" s_A1`: what is between the quotes, with the symbol left out; otherwise all of it.
@@ -129,6 +148,10 @@ mod tests {
         assert_eq!(split_unit("in / out"), title("in / out", ""));
         assert_eq!((split_unit("t/s"), split_unit("Time/ms")), (title("t", "s"), title("Time", "ms")));
         assert_eq!((split_unit("m/s"), split_unit("H1/N")), (title("m/s", ""), title("H1/N", "")));
+        let row = |fields: [&str; 3]| of_row(&fields.map(str::to_owned));
+        assert_eq!(row(["t/ms", "a/V", "b/m/s^2"]), [title("t", "ms"), title("a", "V"), title("b", "m/s^2")]);
+        assert_eq!(row(["t/ms", "a/b", "H1 (1/N)"]), [title("t", "ms"), title("a/b", ""), title("H1", "1/N")]);
+        assert_eq!(row(["t", "a/V", "b"]), [title("t", ""), title("a/V", ""), title("b", "")]);
     }
 
     #[test]

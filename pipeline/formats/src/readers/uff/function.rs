@@ -4,10 +4,12 @@ use super::header::Header;
 use super::layout::Layout;
 use super::samples::{Picked, Text};
 use super::scan::{Data, Dataset, Scanned};
+use crate::evenness::{Stretches, Times, of_gaps};
 use crate::facts::AS_RATE;
 use crate::grid::{Grid, Store};
 use crate::number::Number;
 use crate::pinned::Pinned;
+use crate::printed::Printed;
 use crate::rate::of_step;
 use crate::{Contents, FoundChannel, FoundResponse, Frequencies, Parts, Source, unit_ratio};
 use std::collections::HashMap;
@@ -78,11 +80,10 @@ fn function(
     let (mut ordinates, abscissa) = sources(dataset, pinned)?;
     remarks.extend(doubles(dataset, location));
     let ordinate = ordinates.pop().ok_or("it has no values")?;
-    let times = abscissa.as_ref().and_then(|(source, _)| stored_rate(header, source.as_ref(), location, remarks));
-    let rate = if header.even { even_rate(header, location, remarks) } else { times };
-    let start_s =
-        header.seconds().filter(|_| rate.is_some() && header.even).map(|seconds| header.abscissa_start * seconds);
+    let times = abscissa.as_ref().and_then(|(source, _)| stored_clock(header, source.as_ref(), location, remarks));
     let abscissa = abscissa.filter(|_| times.is_none());
+    let clock = if header.even { even_clock(header, location, remarks) } else { times };
+    let rate = clock.as_ref().map(|clock| clock.rate_hz);
     let mut long_name = header.identification.join(", ");
     if long_name.is_empty() {
         header.ordinate.label.clone_into(&mut long_name);
@@ -91,7 +92,9 @@ fn function(
         unit: unit.to_owned(),
         long_name,
         sample_rate_hz: rate,
-        start_s,
+        rate_relative_std: clock.as_ref().map_or(0.0, |clock| clock.relative_std),
+        start_s: clock.as_ref().map(|clock| clock.start_s),
+        gaps: clock.as_ref().map(|clock| clock.gaps.clone()).unwrap_or_default(),
         ..FoundChannel::new(location, header.points as usize, stored_as, source)
     };
     let stored_as = stored_as(dataset);
@@ -149,8 +152,19 @@ fn response(dataset: &Dataset, location: &str, pinned: &Pinned) -> Result<FoundR
     })
 }
 
-/// The rate of an even abscissa.
-fn even_rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
+/// When samples were taken.
+#[derive(Debug)]
+struct Clock {
+    rate_hz: f64,
+    /// Standard error of the rate, relative.
+    relative_std: f64,
+    start_s: f64,
+    /// Samples before which the times jump.
+    gaps: Vec<usize>,
+}
+
+/// The clock of an even abscissa.
+fn even_clock(header: &Header, location: &str, remarks: &mut Vec<String>) -> Option<Clock> {
     let (start, step, unit) = (header.abscissa_start, header.abscissa_step, &header.abscissa.unit);
     let Some(seconds) = header.seconds() else {
         let what = header.abscissa_name();
@@ -166,14 +180,15 @@ fn even_rate(header: &Header, location: &str, remarks: &mut Vec<String>) -> Opti
     if start != 0.0 {
         remarks.push(format!("{location} begins at {start} {unit}"));
     }
-    Some(of_step(header.step() * seconds))
+    let rate_hz = of_step(header.step() * seconds);
+    Some(Clock { rate_hz, relative_std: 0.0, start_s: start * seconds, gaps: Vec::new() })
 }
 
 /// Abscissae of more points are not looked at: they are read whole.
 const MOST_TIMES: usize = 1 << 22;
 
-/// The rate of an abscissa that is stored point by point and runs evenly to within its printing.
-fn stored_rate(header: &Header, abscissa: &dyn Source, location: &str, remarks: &mut Vec<String>) -> Option<f64> {
+/// The clock of an abscissa that is stored point by point and runs evenly to within its printing, but for jumps.
+fn stored_clock(header: &Header, abscissa: &dyn Source, location: &str, remarks: &mut Vec<String>) -> Option<Clock> {
     let what = header.abscissa_name();
     let none = |why: &str| {
         format!("{location} has no sample rate: {what} is stored point by point, in {location}/abscissa{why}")
@@ -182,15 +197,20 @@ fn stored_rate(header: &Header, abscissa: &dyn Source, location: &str, remarks: 
         remarks.push(none(""));
         return None;
     };
-    match stored_step(abscissa, header.points as usize) {
-        Ok((step, start)) => {
-            let unit = &header.abscissa.unit;
+    match stored_times(abscissa, header.points as usize) {
+        Ok(found) => {
+            let (unit, even) = (&header.abscissa.unit, found.even);
             remarks.push(format!(
-                "{location}/abscissa is {AS_RATE}: its {} values run evenly from {start} {unit} in steps of {step} \
-                 {unit}",
-                header.points
+                "{location}/abscissa is {AS_RATE}: its {} values run evenly from {} {unit} in steps of {} {unit}",
+                header.points, even.first, even.step
             ));
-            Some(of_step(step * seconds))
+            remarks.extend(of_gaps(&format!("{location}/abscissa"), &found));
+            Some(Clock {
+                rate_hz: of_step(even.step * seconds),
+                relative_std: even.relative_std(),
+                start_s: even.first * seconds,
+                gaps: found.gaps,
+            })
         }
         Err(why) => {
             remarks.push(none(&format!(": {why}")));
@@ -199,14 +219,14 @@ fn stored_rate(header: &Header, abscissa: &dyn Source, location: &str, remarks: 
     }
 }
 
-/// Step and first value of a stored abscissa, fitted to all of it: neighbours are printed alike or differ by the printing.
-/// Errors: why it is not even.
-fn stored_step(abscissa: &dyn Source, points: usize) -> Result<(f64, f64), String> {
+/// How a stored abscissa runs: neighbours are printed alike or differ by the printing. Errors: why it is not even.
+fn stored_times(abscissa: &dyn Source, points: usize) -> Result<Stretches, String> {
     if points > MOST_TIMES {
         return Err(format!("its {points} values are too many to look at, wanted at most {MOST_TIMES}"));
     }
     let times = abscissa.read(0, points).map_err(|error| error.to_string())?.widened();
-    Ok((crate::even_step(&times)?, times.first().copied().unwrap_or_default()))
+    let printed = Printed::of(&times);
+    Times { printed: Some(&printed), ..Times::exact(&times) }.stretches(None)
 }
 
 type Abscissa = Option<(Arc<dyn Source>, &'static str)>;
