@@ -61,7 +61,8 @@ pub struct NewPipelineArgs {
     #[arg(long, value_name = "NAME")]
     pub channel: Vec<String>,
     /// The measured input, as `afmid inspect` names it; several of several inputs [default: channels named as a force,
-    /// an input, a drive].
+    /// an input, a drive]. A file among RECORDINGS, or FILE:NAME, if input and output are in files of their own, recorded
+    /// at the same time.
     #[arg(long, value_name = "NAME")]
     pub input: Vec<String>,
     /// What files and channels are, of decays: hits, or sensors that saw the same hits; of a force and what moves: hits, or

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::output::{print, say};
 use crate::printable::{one_line, shown};
 use crate::relative::folder_of;
-use crate::scaffold::{Wanted, choose, left_out, look, pipeline, python, rust};
+use crate::scaffold::{Wanted, choose, joined_files, left_out, look, pipeline, python, rust};
 use crate::show::pretty;
 
 /// Writes what was asked for.
@@ -34,8 +34,14 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         rate_hz: args.rate,
         unit: args.unit.as_deref(),
     };
-    let source = look(&args.recordings, &wanted).map_err(usage)?;
+    let joined = joined_files(&args.recordings, &wanted).map_err(usage)?;
+    let (source, inputs, channels, notes) = match joined {
+        Some(joined) => (joined.source, joined.inputs, joined.outputs, joined.notes),
+        None => (look(&args.recordings, &wanted).map_err(usage)?, args.input.clone(), args.channel.clone(), Vec::new()),
+    };
+    let wanted = Wanted { inputs: &inputs, channels: &channels, ..wanted };
     let mut choice = choose(&source, &wanted).map_err(usage)?;
+    choice.notes.extend(notes);
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", choice.goal.name())));
     // also a link to nothing
     if output.symlink_metadata().is_ok() {
@@ -52,13 +58,13 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     if args.json {
         return print(&pretty(&json!({
             "config": output.display().to_string(),
-            "recordings": source.files.len(),
+            "recordings": source.count(),
             "goal": choice.goal.name(),
             "chosen": choice.why,
             "notes": choice.notes,
         }))?);
     }
-    let files = if source.files.len() == 1 { "1 file".to_owned() } else { format!("{} files", source.files.len()) };
+    let files = if source.count() == 1 { "1 file".to_owned() } else { format!("{} files", source.count()) };
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
     let why = if choice.why.is_empty() { String::new() } else { format!("; {}", one_line(&choice.why)) };
     // the stage that all others lead to

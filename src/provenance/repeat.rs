@@ -47,7 +47,7 @@ pub fn places(plan: &Plan, file: &ResultFile, base: &Path, finder: &Finder) -> V
         let needed = !record.sources.is_empty() && !reads_the_same(node, record, base);
         if needed { reader(node, record, finder) } else { None }
     };
-    plan.nodes.iter().filter_map(set).collect()
+    plan.nodes.iter().filter_map(set).flatten().collect()
 }
 
 /// A stage that writes files, and where it does so in a repetition: not over what others may use by now.
@@ -144,19 +144,30 @@ fn location(node: &Node) -> Option<(&'static str, &Value)> {
     Some((name, node.params.get(name)?))
 }
 
-fn reader(node: &Node, record: &StageRecord, finder: &Finder) -> Option<String> {
-    let (name, value) = location(node)?;
+/// `--set` arguments for all places of a stage: those of one file each, and at most one list with the rest.
+fn reader(node: &Node, record: &StageRecord, finder: &Finder) -> Option<Vec<String>> {
     let found = record.sources.iter().map(|source| match finder.find(source) {
         Now::Same(path) => Some(quoted(&std::path::absolute(path).ok()?)),
         _ => None,
     });
-    let found: Vec<String> = found.collect::<Option<_>>()?;
-    let value = match (value, &found[..]) {
-        (Value::Array(_), _) => format!("[{}]", found.join(", ")),
-        (_, [one]) => one.clone(),
-        _ => return None,
-    };
-    Some(format!("{}.{name}={value}", node.id))
+    let mut found: Vec<String> = found.collect::<Option<_>>()?;
+    let places = node.stage.location_params().iter().filter_map(|name| Some((name, node.params.get(*name)?)));
+    let (mut singles, mut lists) = (Vec::new(), Vec::new());
+    for (name, value) in places {
+        match value {
+            Value::String(place) if !place.is_empty() => singles.push(name),
+            Value::Array(places) if !places.is_empty() => lists.push(name),
+            _ => {}
+        }
+    }
+    if singles.len() > found.len() || lists.len() > 1 || (lists.is_empty() && singles.len() < found.len()) {
+        return None;
+    }
+    let rest = found.split_off(singles.len());
+    let mut set: Vec<String> =
+        singles.iter().zip(&found).map(|(name, file)| format!("{}.{name}={file}", node.id)).collect();
+    set.extend(lists.first().map(|name| format!("{}.{name}=[{}]", node.id, rest.join(", "))));
+    Some(set)
 }
 
 /// A TOML string: JSON's escapes are TOML's.

@@ -1,13 +1,14 @@
 //! The samples of the file that stands for all of its kind.
 
 use std::cell::OnceCell;
+use std::path::PathBuf;
 
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, find_decays};
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, Reading, UnpackedContents, contradiction, gains_without_phase, mean_rate,
-    open_unpacked, responses, says_frequencies,
+    Contents, FoundChannel, FoundResponse, Measurement, Reading, UnpackedContents, contradiction, gains_without_phase,
+    mean_rate, open_unpacked, responses, says_frequencies,
 };
 
 use super::channels::{some_of, usable};
@@ -26,7 +27,14 @@ const RINGS: usize = 2;
 #[derive(Debug)]
 pub struct FirstFile<'a> {
     pub source: &'a Source,
-    opened: OnceCell<Result<UnpackedContents, String>>,
+    opened: OnceCell<Result<Opened, String>>,
+}
+
+/// One file, or several of one measurement.
+#[derive(Debug)]
+enum Opened {
+    File(UnpackedContents),
+    Files(Measurement),
 }
 
 impl<'a> FirstFile<'a> {
@@ -34,22 +42,32 @@ impl<'a> FirstFile<'a> {
         Self { source, opened: OnceCell::new() }
     }
 
-    fn opened(&self) -> Result<&UnpackedContents, String> {
+    fn contents(&self) -> Result<&Contents, String> {
         let open = || {
-            open_unpacked(&self.source.opened, &self.source.file, &Reading::of("auto", None))
-                .map_err(|error| error.to_string())
+            let (files, reading) = (&self.source.opened, Reading::of("auto", None));
+            let opened = if self.source.joined.is_empty() {
+                open_unpacked(files, &self.source.file, &reading).map(Opened::File)
+            } else {
+                let paths: Vec<PathBuf> = [&self.source.file].into_iter().chain(&self.source.joined).cloned().collect();
+                Measurement::open(files, &paths, &reading).map(Opened::Files)
+            };
+            opened.map_err(|error| error.to_string())
         };
-        self.opened.get_or_init(open).as_ref().map_err(Clone::clone)
+        match self.opened.get_or_init(open) {
+            Ok(Opened::File(file)) => Ok(&file.contents),
+            Ok(Opened::Files(files)) => Ok(files.contents()),
+            Err(problem) => Err(problem.clone()),
+        }
     }
 
     /// Whether it holds frequency responses; `guessed`: even if nothing in it says so.
     pub fn has_responses(&self, guessed: bool) -> bool {
-        self.opened().is_ok_and(|opened| holds_responses(&opened.contents, guessed))
+        self.contents().is_ok_and(|contents| holds_responses(contents, guessed))
     }
 
     /// Why a file over frequencies holds no responses; none where it holds some, or nothing says that it has frequencies.
     pub fn no_responses(&self) -> Option<Question> {
-        let contents = &self.opened().ok()?.contents;
+        let contents = self.contents().ok()?;
         contents.channels.iter().find(|channel| says_frequencies(channel))?;
         let error = responses(contents, None).err()?;
         Some((format!("{}: {}", self.source.file.display(), error.problem), error.help))
@@ -57,7 +75,7 @@ impl<'a> FirstFile<'a> {
 
     /// That the file holds spectra and no record over time, and what reads them; none where it holds a record.
     pub fn spectrum(&self) -> Option<Question> {
-        let contents = &self.opened().ok()?.contents;
+        let contents = self.contents().ok()?;
         if let Some(Err(error)) =
             contents.responses.first().map(|response| response.frequency_channel(&contents.channels))
         {
@@ -84,7 +102,7 @@ impl<'a> FirstFile<'a> {
     /// The axis of frequencies, and what lies over it; none where the file holds a record. `guessed`: even if the axis
     /// does not say that it is one of frequencies.
     pub fn spectra(&self, guessed: bool) -> Option<(String, Vec<String>)> {
-        let contents = &self.opened().ok()?.contents;
+        let contents = self.contents().ok()?;
         let untimed = |channel: &&FoundChannel| channel.is_axis && mean_rate(&contents.channels, channel).is_none();
         let said = contents.channels.iter().find(|channel| says_frequencies(channel));
         let axis = said.or_else(|| contents.channels.iter().find(untimed).filter(|_| guessed))?;
@@ -105,14 +123,14 @@ impl<'a> FirstFile<'a> {
 
     /// That the rate which the user gives is not that of the times beside a channel.
     pub fn contradicted_rate(&self, channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
-        let channels = &self.opened().ok()?.contents.channels;
+        let channels = &self.contents().ok()?.channels;
         let found = channels.iter().find(|found| found.location == channel.location)?;
         contradiction(channels, found, wanted.rate_hz?)
     }
 
     /// The mean rate of the times beside a channel that give none.
     pub fn mean_rate(&self, channel: &Channel) -> Option<String> {
-        let channels = &self.opened().ok()?.contents.channels;
+        let channels = &self.contents().ok()?.channels;
         let found = channels.iter().find(|found| found.location == channel.location)?;
         let (rate, axis) = mean_rate(channels, found)?;
         Some(format!("the times in {axis} have {} samples a second on average", number(rate)))
@@ -120,7 +138,7 @@ impl<'a> FirstFile<'a> {
 
     /// A channel's first samples. Errors: they cannot be read.
     pub fn samples(&self, channel: &Channel) -> Result<Vec<f64>, Question> {
-        let channels = &self.opened().map_err(|problem| self.plain(&problem))?.contents.channels;
+        let channels = &self.contents().map_err(|problem| self.plain(&problem))?.channels;
         let found = channels.iter().find(|found| found.location == channel.location);
         let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
         first_samples(found).map_err(|error| self.plain(&error.to_string()))

@@ -8,6 +8,7 @@ mod groups;
 mod hit_names;
 mod left_out;
 mod lever;
+mod measurement;
 mod pipeline;
 mod points;
 mod recordings;
@@ -18,6 +19,7 @@ mod steps;
 
 pub use choice::choose;
 pub use left_out::left_out;
+pub use measurement::joined_files;
 pub use pipeline::{Wanted, pipeline};
 pub use recordings::look;
 pub use stage::{python, rust};

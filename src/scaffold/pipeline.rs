@@ -94,9 +94,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
     let params = match reader {
         "io.columns" if takes => {
             let files = source.patterns.iter().map(|pattern| path(pattern, folder)).collect();
-            columns(source, ("files", Value::Array(files)), choice, wanted)
+            columns(source, ("files", Value::Array(files)), choice, wanted, folder)
         }
-        "io.columns" => columns(source, ("file", path(&source.file, folder)), choice, wanted),
+        "io.columns" => columns(source, ("file", path(&source.file, folder)), choice, wanted, folder),
         "io.frf" => Ok(responses(source, wanted, folder)),
         "io.spectrum" => Ok(density::params(source, choice, wanted, folder)),
         _ => records(source, choice, wanted, folder),
@@ -209,17 +209,22 @@ pub fn path(of: &Path, folder: &Path) -> Value {
     })
 }
 
-/// The `params` of a stage `io.columns` that reads a `file`, or several `files`.
+/// The `params` of a stage `io.columns` that reads a `file`, with those that are joined to it, or several `files`.
 pub fn columns(
     source: &Source,
     (name, recordings): (&str, Value),
     choice: &Choice<'_>,
     wanted: Wanted<'_>,
+    folder: &Path,
 ) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
     let (output, location) = (choice.channels[0], |channel: &&Channel| text(&channel.location));
     let mut params = Table::new();
     params.insert(name.to_owned(), recordings);
+    if !source.joined.is_empty() {
+        let joined = source.joined.iter().map(|file| path(file, folder)).collect();
+        params.insert("joined_files".to_owned(), Value::Array(joined));
+    }
     params.insert("inputs".to_owned(), Value::Array(choice.inputs.iter().map(location).collect()));
     match choice.channels.len() {
         1 => params.insert("output".to_owned(), text(&output.location)),
@@ -266,6 +271,7 @@ mod tests {
             reason: String::new(),
             remarks: Vec::new(),
             files: vec![PathBuf::from("/lab/years/2004/a.tdms"); 3],
+            joined: Vec::new(),
             rate_hz: rate,
             others: Vec::new(),
             skipped: Vec::new(),

@@ -45,7 +45,7 @@ fn stages(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pat
     for (number, file) in source.files.iter().enumerate() {
         let data = format!("data_{}", number + 1);
         let id = if number + 1 == source.files.len() { "frf".to_owned() } else { format!("frf_{}", number + 1) };
-        let params = columns(source, ("file", path(file, folder)), choice, wanted)?;
+        let params = columns(source, ("file", path(file, folder)), choice, wanted, folder)?;
         text += &format!("[[stage]]\nid = \"{data}\"\nuses = \"io.columns\"\n{params}\n");
         let before_input = before.map(|before| format!(", before = \"{before}.frf\"")).unwrap_or_default();
         let point = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -27,6 +27,8 @@ pub struct Source {
     pub remarks: Vec<String>,
     /// All files of that kind, in the order in which they were given.
     pub files: Vec<PathBuf>,
+    /// Further files of the measurement in the first one, where input and output are in files of their own.
+    pub joined: Vec<PathBuf>,
     /// The rate that they share, where they state one and others were given with them.
     pub rate_hz: Option<f64>,
     /// Recordings of other kinds, which are left out.
@@ -38,9 +40,15 @@ pub struct Source {
 }
 
 impl Source {
-    /// The first file's name.
+    /// The first file's name, and those that are joined to it.
     pub fn name(&self) -> String {
-        self.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        [&self.file].into_iter().chain(&self.joined).map(name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// How many files there are.
+    pub fn count(&self) -> usize {
+        self.files.len() + self.joined.len()
     }
 }
 
@@ -133,6 +141,7 @@ fn source(
             remarks: holdings.remarks,
             channels: holdings.channels,
             files,
+            joined: Vec::new(),
             rate_hz,
             others: groups.all,
             skipped: groups.skipped,

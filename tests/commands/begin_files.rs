@@ -14,7 +14,7 @@ fn decay(amplitude: f64, seed: u32) -> Vec<f64> {
 }
 
 /// Noise of variance 1: sums of twelve uniform numbers.
-fn noise(seed: u32) -> Vec<f64> {
+pub(super) fn noise(seed: u32) -> Vec<f64> {
     let mut state = u64::from(seed).wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut uniform = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -34,7 +34,7 @@ fn table(here: &Path, name: &str, step_s: f64, header: &str, columns: &[Vec<f64>
 }
 
 /// The modes' frequencies of a config that runs.
-fn frequencies(here: &Path, config: &str) -> Vec<f64> {
+pub(super) fn frequencies(here: &Path, config: &str) -> Vec<f64> {
     let result = format!("{config}.h5");
     said(here, &["run", config, "-o", &result, "--cache", "cache"]);
     let [shown, _] = said(here, &["show", &result, "modes", "--json"]);
@@ -217,14 +217,14 @@ fn what_lies_over_frequencies_is_no_record() {
 const POINTS: [f64; 5] = [0.1, 0.25, 0.4, 0.65, 0.8];
 const SENSOR: f64 = 0.25;
 /// Frequency in Hz and damping ratio of the modes sin(pi x), sin(2 pi x).
-const MODES: [[f64; 2]; 2] = [[40.0, 0.02], [130.0, 0.01]];
+pub(super) const MODES: [[f64; 2]; 2] = [[40.0, 0.02], [130.0, 0.01]];
 
 fn mode_shape(mode: usize, x: f64) -> f64 {
     (std::f64::consts::PI * (mode + 1) as f64 * x).sin()
 }
 
 /// What a sensor sees of a force of 1000 samples a second at `x`, with noise.
-fn moved(force: &[f64], x: f64, seed: u32) -> Vec<f64> {
+pub(super) fn moved(force: &[f64], x: f64, seed: u32) -> Vec<f64> {
     let mut sum: Vec<f64> = noise(seed).iter().cycle().take(force.len()).map(|e| 1e-3 * e).collect();
     for (mode, [frequency, damping]) in MODES.iter().enumerate() {
         let w = std::f64::consts::TAU * frequency / 1e3;

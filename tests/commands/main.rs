@@ -12,6 +12,7 @@ mod clocks;
 mod command_line;
 mod errors;
 mod example;
+mod measurement;
 mod plugins;
 mod provenance;
 mod python_reader;

@@ -21,6 +21,7 @@ mod joined;
 mod labels;
 mod lanes;
 mod listing;
+mod measurement;
 mod number;
 mod opened;
 mod packed;
@@ -47,6 +48,7 @@ pub use frequency::hertz;
 pub use grid::numbers_in_file;
 pub use labels::{Labels, lane_names};
 pub use lanes::Lanes;
+pub use measurement::{joined, names_of_files, put_together};
 pub use number::Number;
 pub use rate::{
     Clue, LEAST_RATE_HZ, MOST_RATE_HZ, WANTED_RATE, agreed_rate, agreed_start, brief_number, is_rate, one_number,

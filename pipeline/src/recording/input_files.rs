@@ -190,6 +190,11 @@ impl HashedFile {
         self.state
     }
 
+    /// Hash of its bytes.
+    pub(super) fn blake3(&self) -> &str {
+        &self.blake3
+    }
+
     /// Bytes.
     pub(crate) fn size(&self) -> u64 {
         self.state.size()

@@ -10,6 +10,7 @@ mod how;
 mod inflated;
 mod input_files;
 mod lazy_source;
+mod measurement;
 mod native;
 mod open;
 mod opened_files;
@@ -43,11 +44,13 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 pub use afmid_formats::{
     Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Row, Source, WANTED_RATE,
     begun_together, brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact, is_rate,
-    lane_names, mean_rate, most_inflated, one_rate, rates_agree, responses, says_frequencies, unit_ratio,
+    joined, lane_names, mean_rate, most_inflated, names_of_files, one_rate, put_together, rates_agree, responses,
+    says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use equal::{SamplePrint, equal_samples};
 pub use how::{How, Reading};
+pub use measurement::Measurement;
 pub use open::{Opened, open_records, recognised};
 pub use rate::{AgreedRate, agreed_rate};
 pub use responses::{FileResponse, read_responses};

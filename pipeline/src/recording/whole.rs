@@ -38,6 +38,11 @@ impl WholeFile {
         &self.contents
     }
 
+    /// BLAKE3 hash of the bytes that were opened.
+    pub(super) fn blake3(&self) -> &str {
+        self.hashed.blake3()
+    }
+
     /// All values of a channel in its unit, NaN where samples are missing: stored * scale_factor + add_offset.
     ///
     /// Errors: numbers of more than half of what compressed data of a file of that size may come to; as

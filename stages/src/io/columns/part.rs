@@ -1,9 +1,9 @@
-//! The channels of one file: inputs, outputs, their rate and units.
+//! The channels of one measurement: inputs, outputs, their rate and units.
 
 use afmid_pipeline::StageError;
 use afmid_pipeline::recording::{
-    AgreedRate, FoundChannel, WANTED_RATE, WholeFile, agreed_rate, begun_together, brief_number, contradiction,
-    even_step, is_rate, lane_names, one_rate,
+    AgreedRate, FoundChannel, Measurement, WANTED_RATE, agreed_rate, begun_together, brief_number, contradiction,
+    even_step, is_rate, lane_names, one_rate, put_together,
 };
 
 use super::selection::Column;
@@ -11,7 +11,7 @@ use super::stage::Columns;
 use crate::at_hand::Named;
 use crate::io::repeats::{same_values, varies};
 
-/// Inputs and outputs of one file in their units, NaN where missing.
+/// Inputs and outputs of one measurement in their units, NaN where missing.
 pub(super) struct Part {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,
@@ -35,11 +35,12 @@ const SAME_RATE: f64 = 1e-6;
 
 impl Part {
     /// Reads the channels. Errors: see the stage.
-    pub fn read(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
+    pub fn read(wanted: &Columns, file: &Measurement) -> Result<Self, StageError> {
         let found = Channels::find(wanted, file)?;
+        let together = found.put_together(wanted, file)?;
         let AgreedRate { rate_hz, relative_std, overruled } = found.rate(wanted, file)?;
         let mut remarks: Vec<String> = overruled.into_iter().collect();
-        let (channels, apart) = found.begun_together()?;
+        let (channels, apart) = together;
         remarks.extend(apart);
         let values = |channel: &FoundChannel, scale: f64| -> Result<Vec<f64>, StageError> {
             let value = |value: f64| if wanted.missing.contains(&value) { f64::NAN } else { value * scale };
@@ -164,7 +165,7 @@ struct Channels {
 }
 
 impl Channels {
-    fn find(wanted: &Columns, file: &WholeFile) -> Result<Self, StageError> {
+    fn find(wanted: &Columns, file: &Measurement) -> Result<Self, StageError> {
         let contents = file.contents();
         let found = |columns: &[Column]| {
             columns.iter().map(|column| column.of(contents).cloned()).collect::<Result<Vec<_>, StageError>>()
@@ -181,17 +182,24 @@ impl Channels {
         self.outputs.first().map_or("", |channel| &channel.location)
     }
 
-    /// The same from the instant on at which the last of them begins, and what to say of it. Errors: as
-    /// [`begun_together`].
-    fn begun_together(self) -> Result<(Self, Option<String>), StageError> {
-        let moved = begun_together(&self.all().collect::<Vec<_>>())?;
-        let Some((mut inputs, said)) = moved else { return Ok((self, None)) };
+    /// The same from the instant on at which the last of them begins, of several files also up to where the first of them
+    /// ends, and what to say of it. Errors: as [`begun_together`], [`put_together`].
+    fn put_together(&self, wanted: &Columns, file: &Measurement) -> Result<(Self, Vec<String>), StageError> {
+        let all: Vec<&FoundChannel> = self.all().collect();
+        let (mut inputs, said) = if file.is_joined() {
+            put_together(&all, wanted.sample_rate_hz.is_some())?
+        } else {
+            match begun_together(&all)? {
+                Some((moved, said)) => (moved, vec![said]),
+                None => (all.into_iter().cloned().collect(), Vec::new()),
+            }
+        };
         let outputs = inputs.split_off(self.inputs.len());
-        Ok((Self { inputs, outputs }, Some(said)))
+        Ok((Self { inputs, outputs }, said))
     }
 
     /// The one rate that all state, or that the user gives. Errors: none, or several.
-    fn rate(&self, wanted: &Columns, file: &WholeFile) -> Result<AgreedRate, StageError> {
+    fn rate(&self, wanted: &Columns, file: &Measurement) -> Result<AgreedRate, StageError> {
         one_rate(&self.all().collect::<Vec<_>>())?;
         let stated = self.all().find(|channel| channel.sample_rate_hz.is_some());
         if let (None, None, Some(column)) = (stated, wanted.sample_rate_hz, &wanted.time) {
@@ -244,7 +252,7 @@ fn names(channels: &[FoundChannel]) -> Vec<String> {
 }
 
 /// The rate of a channel of times. Errors: there is none; they are not equally spaced.
-fn spaced_equally(column: &Column, file: &WholeFile) -> Result<f64, StageError> {
+fn spaced_equally(column: &Column, file: &Measurement) -> Result<f64, StageError> {
     let times = file.read(column.of(file.contents())?)?;
     let uneven = |why: String| {
         StageError::new(format!("the times in channel {column} are not equally spaced: {why}"))

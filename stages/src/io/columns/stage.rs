@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{RawBinary, Reading, WholeFile};
+use afmid_pipeline::recording::{Measurement, RawBinary, Reading};
 use afmid_pipeline::{Array, Context, Document, Example, Faults, InputFiles, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,8 @@ use crate::io::shared_data::moved;
 ///
 /// # Model
 /// Equally sampled inputs u and an output y, or several, channels of a file of any format that `io.records` opens: columns of a
-/// table, variables of a MATLAB file, datasets, channels of an oscilloscope or recorder (docs/archives.md).
+/// table, variables of a MATLAB file, datasets, channels of an oscilloscope or recorder (docs/archives.md). They may lie
+/// in files of their own (`joined_files`), which were recorded at the same time.
 /// # Method
 /// Two stretches of time, identification and verification. Mean or line are taken off with the constants of the
 /// identification stretch alone, also from the other, which so stays unseen. Missing samples (empty, NaN, the given
@@ -28,6 +29,10 @@ use crate::io::shared_data::moved;
 /// taken off; the first is the identification stretch, the last the verification. Of files with the same bytes, or with
 /// equal samples of all channels (more than 100, an output that varies), the first counts, and a warning names the
 /// others.
+///
+/// Channels are put together at one sample rate. Those that begin later than others, by their times or by dates that are
+/// finer than a sample, begin with the last of them: by whole samples and, for the rest, by interpolation. Channels of
+/// several files end with the first that ends. A warning says both.
 /// # Shapes
 /// `response`, `force` over `time`, the whole record; the same with `_identification` and `_verification` over axes of
 /// their own, which may differ in length. With several inputs `force` is over (`input`, time), with several outputs
@@ -38,8 +43,8 @@ use crate::io::shared_data::moved;
 /// # Accuracy
 /// Numbers as in the file; 64-bit integers beyond 2^53 are rounded.
 /// # Errors
-/// A file of no format or damaged; a channel that is not there; no sample rate, two that differ, times that are not
-/// equally spaced; files of unlike rates or units; stretches beyond the record or across an interruption; missing
+/// A file of no format or damaged; a channel that is not there; no sample rate, two that differ, of several files one
+/// without; dates that are too coarse; files that do not overlap in time; times that are not equally spaced; files of unlike rates or units; stretches beyond the record or across an interruption; missing
 /// inputs; an output that is missing altogether.
 /// # Source
 /// L. Ljung, System Identification, 1999, sections 14.1 and 16.5; docs/archives.md for the formats.
@@ -53,6 +58,10 @@ pub struct Columns {
     /// likewise, with the rules of `io.records`. Default: none. Why: `spectrum.measured_frf` averages over all; other
     /// stages take one record.
     pub files: Vec<String>,
+    /// Further files of the measurement in `file`, recorded at the same time: input and output in files of their own.
+    /// Channels are then named `FILE:CHANNEL` (`u.csv:force`), or numbered through all files in this order. Default: none.
+    /// Why: mostly all channels are in one file.
+    pub joined_files: Vec<String>,
     /// Channels of the inputs, at least one. Default: the first.
     pub inputs: Vec<Column>,
     /// Channel of the output. Default: the second.
@@ -98,6 +107,7 @@ impl Default for Columns {
         Self {
             file: String::new(),
             files: Vec::new(),
+            joined_files: Vec::new(),
             inputs: vec![Column::Number(1)],
             output: Column::Number(2),
             outputs: Vec::new(),
@@ -125,7 +135,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 8,
+        version: 9,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -139,6 +149,17 @@ impl Stage for Columns {
         });
         faults.require(self.file.is_empty() || self.files.is_empty(), || {
             "`file` and `files` are both given, wanted one of them".to_owned()
+        });
+        faults.require(self.joined_files.is_empty() || self.files.is_empty(), || {
+            "`files` and `joined_files` are both given, wanted one measurement: a `file` with its `joined_files`"
+                .to_owned()
+        });
+        faults.require(self.joined_files.iter().all(|file| !file.is_empty()), || {
+            "`joined_files` has an empty name, wanted files such as \"u.csv\"".to_owned()
+        });
+        faults.require(self.joined_files.is_empty() || self.time.is_none(), || {
+            "`time` and `joined_files` are both given, wanted `sample_rate_hz`, or times that each file states"
+                .to_owned()
         });
         faults.require(!self.inputs.is_empty(), || "`inputs` is empty, wanted at least one channel".to_owned());
         self.inputs.iter().for_each(|column| faults.take(column.check("inputs")));
@@ -166,16 +187,18 @@ impl Stage for Columns {
 
     fn sources(&self, base: &Path, files: &InputFiles) -> Result<Vec<PathBuf>, StageError> {
         let paths = self.paths(base, files)?;
-        match &paths[..] {
-            [path] if !path.is_file() => {
-                Err(StageError::new(format!("`file` is {}, which is not there", path.display())))
+        let gone = paths.iter().position(|path| self.files.is_empty() && !path.is_file());
+        match gone.and_then(|number| Some((number, paths.get(number)?))) {
+            Some((number, path)) => {
+                let name = if number == 0 { "file" } else { "joined_files" };
+                Err(StageError::new(format!("`{name}` is {}, which is not there", path.display())))
             }
-            _ => Ok(paths),
+            None => Ok(paths),
         }
     }
 
     fn location_params() -> &'static [&'static str] {
-        &["file", "files"]
+        &["file", "files", "joined_files"]
     }
 
     fn run(&self, _inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
@@ -194,13 +217,19 @@ impl Stage for Columns {
 impl Columns {
     /// What the files hold, each recording once: says which copies are left out. Errors: see the stage.
     fn parts(&self, cx: &Context) -> Result<Vec<Part>, StageError> {
-        let paths = each_file_once(self.paths(cx.base(), cx.files())?, cx)?;
-        let mut parts: Vec<(PathBuf, Part)> = Vec::with_capacity(paths.len());
+        let paths = self.paths(cx.base(), cx.files())?;
+        let measurements: Vec<Vec<PathBuf>> = match self.joined_files.is_empty() {
+            true => each_file_once(paths, cx)?.into_iter().map(|path| vec![path]).collect(),
+            false => vec![paths],
+        };
+        let mut parts: Vec<(PathBuf, Part)> = Vec::with_capacity(measurements.len());
         let mut copies: Vec<CopyOf> = Vec::new();
-        for path in paths {
-            let file = WholeFile::open(cx.files(), &path, &Reading::of(&self.format, self.raw.clone()))?;
+        for paths in measurements {
+            let file = Measurement::open(cx.files(), &paths, &Reading::of(&self.format, self.raw.clone()))?;
+            let path = paths.into_iter().next().unwrap_or_default();
             let part = Part::read(self, &file).and_then(|part| part.like(parts.first().map(|(_, first)| first)));
-            let part = part.map_err(|error| error.at(&path))?;
+            // channels of several files are named with theirs
+            let part = part.map_err(|error| if file.is_joined() { error } else { error.at(&path) })?;
             if let Some((of, _)) = parts.iter().find(|(_, earlier)| part.is_copy_of(earlier)) {
                 copies.push((name_beside(&path, of), name_beside(of, &path)));
                 continue;
@@ -222,7 +251,7 @@ impl Columns {
         let root = std::env::var_os("AFMID_DATA");
         let moved = |path: &String| moved(path, root.as_deref().map(Path::new));
         if self.files.is_empty() {
-            return Ok(vec![base.join(moved(&self.file))]);
+            return Ok([&self.file].into_iter().chain(&self.joined_files).map(|file| base.join(moved(file))).collect());
         }
         let found = matching_files(&self.files.iter().map(moved).collect::<Vec<_>>(), base, files)?;
         let records: Vec<PathBuf> = found.into_iter().filter(|file| !file.is_result).map(|file| file.path).collect();
