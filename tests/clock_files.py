@@ -45,7 +45,7 @@ def channels(rule, random):
     stored, unit, other = t, "s", t
     if rule == "milliseconds":
         stored, unit = 1e3 * t, "ms"
-    elif rule == "start":
+    elif rule in ("start", "stated start"):
         other = t + LATE_S
     elif rule == "whole numbers":
         stored, unit = 10 * np.arange(SAMPLES) + 53120, ""
@@ -55,7 +55,7 @@ def channels(rule, random):
         stored = t = t + 5e-3 / RATE_HZ * random.uniform(-1, 1, SAMPLES)
     elif rule == "two rates":
         other = uniform(SAMPLES // 2, RATE_HZ / 2)
-    shared = rule not in ("start", "two rates")
+    shared = rule not in ("start", "stated start", "two rates")
     other = t if shared else other
     return (stored, seen(0, t, random)), (stored if shared else other, seen(1, other, random)), unit, shared
 
@@ -66,12 +66,16 @@ def stated(rule):
 
 
 def text(path, rule, a, b, unit, shared):
+    if rule == "stated start":
+        return False
     if rule == "wrong rate":
         rows = "\n".join(f"{x:.6f},{y:.6f}" for x, y in zip(a[1], b[1]))
         path.write_text(f"# Sampling Rate: 8000 Hz\nA (g),B (g)\n{rows}\n")
         return
     name = f"Time ({unit})" if unit else "Time"
     columns = {name: a[0], "A (g)": a[1], "B (g)": b[1]}
+    if rule == "contradiction":
+        columns = {name: a[0], "Time (ms)": 2e3 * a[0], "A (g)": a[1], "B (g)": b[1]}
     if not shared:
         columns = {"Time A (s)": a[0], "A (g)": a[1], "Time B (s)": b[0], "B (g)": b[1]}
     table = pandas.DataFrame({key: pandas.Series(values) for key, values in columns.items()})
@@ -82,6 +86,11 @@ def arrays(rule, a, b, unit, shared):
     """Names and values as a notebook saves them."""
     if rule == "wrong rate":
         return {"fs": 8000.0, "A": a[1], "B": b[1]}
+    if rule == "stated start":
+        each = zip("AB", (a, b), (0.0, LATE_S))
+        return {name: {"dt": 1 / RATE_HZ, "t0": late, "y": values} for name, (_, values), late in each}
+    if rule == "contradiction":
+        return {"t_s": a[0], "t_ms": 2e3 * a[0], "A": a[1], "B": b[1]}
     if shared:
         return {"t_ms" if unit == "ms" else "t": a[0], "A": a[1], "B": b[1]}
     return {"A": {"t": a[0], "y": a[1]}, "B": {"t": b[0], "y": b[1]}}
@@ -94,7 +103,7 @@ def npz(path, rule, a, b, unit, shared):
 
 
 def npy(path, rule, a, b, unit, shared):
-    if not shared or rule == "wrong rate":
+    if not shared or rule in ("wrong rate", "contradiction"):
         return False
     name = "t_ms" if unit == "ms" else "t"
     table = np.empty(SAMPLES, [(name, a[0].dtype), ("A", float), ("B", float)])
@@ -110,8 +119,10 @@ def hdf5(path, rule, a, b, unit, shared):
     with h5py.File(path, "w") as file:
         for name, (t, y) in (("A", a), ("B", b)):
             group = file if shared else file.create_group(name)
-            if rule not in ("wrong rate", "start") and "time" not in group:
+            if rule not in ("wrong rate", "start", "stated start") and "time" not in group:
                 group["time"] = t
+                if rule == "contradiction":
+                    group["t_ms"] = 2e3 * t
                 if unit:
                     group["time"].attrs["units"] = unit
             place = name if shared else "y"
@@ -119,17 +130,21 @@ def hdf5(path, rule, a, b, unit, shared):
             group[place].attrs["units"] = "g"
             if rule in ("wrong rate", "start"):
                 group[place].attrs["sampling_rate"] = stated(rule)
+            if rule == "stated start":
+                group.attrs["fs"], group.attrs["start"] = "10 kHz", t[0]
             if rule == "start":
                 group[place].attrs["t0"], group[place].attrs["t0_units"] = 1e3 * t[0], "ms"
 
 
 def netcdf(path, rule, a, b, unit, shared):
+    if rule == "contradiction":
+        return False
     with scipy.io.netcdf_file(path, "w") as file:
         for name, (t, y) in (("A", a), ("B", b)):
             axis = "time" if shared else f"time_{name}"
             if axis not in file.dimensions:
                 file.createDimension(axis, len(t))
-                if rule != "wrong rate":
+                if rule not in ("wrong rate", "stated start"):
                     whole = np.issubdtype(t.dtype, np.integer)
                     times = file.createVariable(axis, "i4" if whole else "f8", (axis,))
                     times[:] = t
@@ -138,6 +153,8 @@ def netcdf(path, rule, a, b, unit, shared):
             values = file.createVariable(name, "f8", (axis,))
             values[:] = y
             values.units = "g"
+            if rule == "stated start":
+                values.sampling_rate, values.t_start = RATE_HZ, t[0]
         if rule == "wrong rate":
             file.sampling_rate = 8000.0
 
@@ -145,12 +162,16 @@ def netcdf(path, rule, a, b, unit, shared):
 def tdms(path, rule, a, b, unit, shared):
     start = np.datetime64("2026-11-26T12:00:00")
     objects = []
+    if rule == "contradiction":
+        return False
     as_waveform = rule in ("milliseconds", "start", "two rates", "wrong rate")
-    if not as_waveform:
+    if not as_waveform and rule != "stated start":
         properties = {"unit_string": unit} if unit else {}
         objects.append(nptdms.ChannelObject("G", "Time", a[0], properties))
     for name, (t, y) in (("A", a), ("B", b)):
         properties = {"unit_string": "g"}
+        if rule == "stated start":
+            properties |= {"sampling_rate": "10 kHz", "t0_ms": 1e3 * float(t[0])}
         if as_waveform:
             step = 1 / 8000.0 if rule == "wrong rate" else float(t[1] - t[0])
             late = np.timedelta64(3000, "us") if rule == "start" and name == "B" else np.timedelta64(0, "us")
@@ -163,7 +184,7 @@ def tdms(path, rule, a, b, unit, shared):
 
 
 def lvm(path, rule, a, b, unit, shared):
-    if rule in ("milliseconds", "whole numbers"):
+    if rule in ("milliseconds", "whole numbers", "stated start", "contradiction"):
         return False
     header = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\t{}\n***End_of_Header***\t\n\t\n"
     with_times = rule in ("jump", "jitter")
@@ -181,7 +202,7 @@ def lvm(path, rule, a, b, unit, shared):
 
 def universal(path, rule, a, b, unit, shared):
     """Universal files 58: stored times where they are uneven."""
-    if rule in ("milliseconds", "whole numbers"):
+    if rule in ("milliseconds", "whole numbers", "stated start", "contradiction"):
         return False
     lines = []
     for node, (t, y) in ((1, a), (2, b)):
@@ -221,7 +242,7 @@ WRITERS = {
     "lvm": (lvm, "lvm"),
     "wav": (wav, "wav"),
 }
-RULES = ["milliseconds", "start", "whole numbers", "jump", "jitter", "two rates", "wrong rate"]
+RULES = ["milliseconds", "start", "whole numbers", "jump", "jitter", "two rates", "wrong rate", "stated start", "contradiction"]
 
 
 def main():
