@@ -56,7 +56,8 @@ wheel: deps .tools/wheel/installed
 # cargo and tested there.
 test-wheel: deps .tools/wheel/installed
 	rm -rf target/wheels
-	.tools/wheel/bin/maturin build --profile dev --locked --manifest-path python/afmid/native/Cargo.toml --out target/wheels
+	.tools/wheel/bin/maturin build --profile dev --features as-tested --locked --manifest-path python/afmid/native/Cargo.toml \
+		--out target/wheels
 	tests/wheel/wheel.sh target/wheels/afmid-*.whl python3
 
 lint: deps
