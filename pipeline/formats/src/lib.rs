@@ -31,6 +31,7 @@ mod rate;
 mod raw;
 pub mod readers;
 mod regular;
+mod resample;
 mod responses;
 mod straight;
 mod text;
