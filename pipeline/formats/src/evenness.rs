@@ -209,7 +209,7 @@ impl<'a> Times<'a> {
         }
         let (row, off) = (self.row + line.row + 1, line.off_steps);
         format!(
-            "it wanders: row {row} is furthest from the even grid, by {off:.3} steps, wanted {MOST_OFF_STEPS}; `resample` puts it on one"
+            "it wanders: row {row} is furthest from the even grid, by {off:.3} steps, wanted {MOST_OFF_STEPS}; `resample` (--resample) puts it on one"
         )
     }
 

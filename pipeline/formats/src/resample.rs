@@ -31,6 +31,15 @@ const SEEN: usize = 1 << 16;
 const FILTER_HALF: usize = 32;
 const FILTER_BETA: f64 = 8.0;
 
+/// In remarks on what was resampled, and on power where that is not right.
+const RESAMPLED: &str = "resampled evenly at";
+const FALSIFIED: &str = "where resampling falsifies amplitudes by more than 1 %";
+
+/// Whether a remark is of [`Contents::resample`].
+pub fn is_of_resampling(remark: &str) -> bool {
+    [RESAMPLED, FALSIFIED].iter().any(|words| remark.contains(words))
+}
+
 /// Rows without a gap between them, and the grid that they are put on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Stretch {
@@ -72,7 +81,7 @@ impl Contents {
             let share = share_above(channel)?;
             if share > SAID_SHARE {
                 too_fast.push(format!(
-                    "{}: {:.0} % of its power lies above {:.6} Hz, where resampling falsifies amplitudes by more than 1 %",
+                    "{}: {:.0} % of its power lies above {:.6} Hz, {FALSIFIED}",
                     channel.location,
                     100.0 * share,
                     RIGHT_SHARE * grid.rate_hz
@@ -89,7 +98,7 @@ impl Contents {
         grids.sort_by(|a, b| a.0.cmp(&b.0));
         for (axis, (grid, names)) in grids {
             self.remarks.push(format!(
-                "{axis} wanders by up to {:.3} steps (row {}): resampled evenly at {} Hz: {}; amplitudes are right to 1 % up \
+                "{axis} wanders by up to {:.3} steps (row {}): {RESAMPLED} {} Hz: {}; amplitudes are right to 1 % up \
                  to {:.6} Hz",
                 grid.off_steps,
                 grid.off_row,
