@@ -80,6 +80,9 @@ pub enum Command {
         /// The files; a folder means all files in it, one line each.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
+        /// Put samples of a clock that wanders on an even grid by interpolation; gaps stay gaps.
+        #[arg(long)]
+        resample: bool,
         /// As JSON, alone on stdout.
         #[arg(long)]
         json: bool,

@@ -77,6 +77,9 @@ pub struct NewPipelineArgs {
     /// Unit of the signal, of files that state none.
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
+    /// Put samples of a clock that wanders on an even grid by interpolation (docs/archives.md); gaps stay gaps.
+    #[arg(long)]
+    pub resample: bool,
     /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left
     /// alone.
     #[arg(short, long, value_name = "CONFIG.toml")]

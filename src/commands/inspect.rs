@@ -13,14 +13,18 @@ use crate::show::pretty;
 
 /// Looks at files, and at the files of folders. Errors: some could not be read; all are reported before. What is no
 /// recording is an error where it was named itself; beside the recordings of a folder it is listed.
-pub fn run(paths: &[PathBuf], as_json: bool) -> Result<(), Failure> {
+pub fn run(paths: &[PathBuf], resample: bool, as_json: bool) -> Result<(), Failure> {
     let (mut looked, mut refused) = (Vec::new(), 0);
     for path in paths {
         let cannot =
             |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", path.display()), None);
         let files = if path.is_dir() { files_of(path).map_err(cannot)? } else { vec![path.clone()] };
         // in parallel, printed in their order
+<<<<<<< HEAD
         let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file, &InputFiles::new())).collect();
+=======
+        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file, resample)).collect();
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
         if !as_json {
             print(&text(path, &inspected))?;
         }

@@ -51,7 +51,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         }
         Command::Submit { to } => submit::run(&to, registry),
         Command::Explain(args) => explain::run(&args, &planning(registry, &consent::none())),
-        Command::Inspect { files, json } => inspect::run(&files, json),
+        Command::Inspect { files, resample, json } => inspect::run(&files, resample, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
         Command::Diff(args) => diff::run(&args),
         Command::Trace(args) => trace::run(&args),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use afmid_pipeline::Registry;
 use afmid_pipeline::files::replace_with;
+use afmid_pipeline::recording::is_of_resampling;
 use serde_json::json;
 
 use super::load::plan_text;
@@ -33,6 +34,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         records_are: args.records_are,
         rate_hz: args.rate,
         unit: args.unit.as_deref(),
+        resample: args.resample,
     };
     let joined = joined_files(&args.recordings, &wanted).map_err(usage)?;
     let (source, inputs, channels, notes) = match joined {
@@ -42,6 +44,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
     let wanted = Wanted { inputs: &inputs, channels: &channels, ..wanted };
     let mut choice = choose(&source, &wanted).map_err(usage)?;
     choice.notes.extend(notes);
+    choice.notes.extend(source.remarks.iter().filter(|remark| is_of_resampling(remark)).cloned());
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", choice.goal.name())));
     // also a link to nothing
     if output.symlink_metadata().is_ok() {

@@ -6,7 +6,7 @@ use super::channel::Channel;
 
 /// The `io.records` stage that reads a channel of a file, with the parameters that it needs; what only the user knows
 /// is left to fill in.
-pub fn stage(path: &Path, channel: &Channel) -> String {
+pub fn stage(path: &Path, channel: &Channel, resample: bool) -> String {
     // a config's paths begin at its folder, which is not known here
     let file = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let mut lines = vec![
@@ -18,6 +18,9 @@ pub fn stage(path: &Path, channel: &Channel) -> String {
         format!("files = [{}]", text(&file.to_string_lossy())),
         format!("channel = {}", text(&channel.location)),
     ];
+    if resample {
+        lines.push("resample = true".to_owned());
+    }
     if channel.sample_rate_hz.is_none() {
         lines.push("# sample_rate_hz = ...  # the file states none: fill it in".to_owned());
     }

@@ -59,6 +59,9 @@ fn command(source: &Source, number: usize, args: &NewPipelineArgs, config: &Path
     let files = if rate.is_some() { &args.recordings } else { &group.files };
     words.extend(files.iter().map(quoted));
     let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
+    if args.resample {
+        words.push("--resample".to_owned());
+    }
     let mut say = |flag: &str, value: String| words.push(format!("{flag} {}", quoted(value)));
     // a rate that files state themselves, or their times or frequencies, is not that of the files that were taken
     let own = group.axes.mean_rate_hz.filter(|_| group.rate_hz().is_none()).map(shown);

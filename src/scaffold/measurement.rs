@@ -42,7 +42,7 @@ pub fn joined_files(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Option<Joi
         let help = "wanted --goal input-output or frf, or none".to_owned();
         return Err(("that goal takes no measured input in a file of its own".to_owned(), Some(help)));
     }
-    let files = Files::open(paths)?;
+    let files = Files::open(paths, wanted.resample)?;
     let inputs = files.inputs(wanted)?;
     let outputs = files.outputs(wanted, &inputs)?;
     let of = |channel: &&Channel| {
@@ -74,17 +74,27 @@ struct Files<'a> {
     /// Of each file, as `FILE:CHANNEL`.
     channels: Vec<Vec<Channel>>,
     remarks: Vec<String>,
+    resample: bool,
 }
 
 impl<'a> Files<'a> {
+<<<<<<< HEAD
     fn open(paths: &'a [PathBuf]) -> Result<Self, Question> {
         let files = InputFiles::new();
         let opened = Measurement::open(&files, paths, &Reading::of("auto", None));
+=======
+    fn open(paths: &'a [PathBuf], resample: bool) -> Result<Self, Question> {
+        let opened = Measurement::open(&InputFiles::new(), paths, &Reading::of("auto", None).resampled(resample));
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
         let opened = opened.map_err(|error| (error.to_string(), error.help.clone()))?;
         let mut names = opened.contents().channels.iter().map(|channel| channel.location.clone());
         let mut channels = Vec::new();
         for path in paths {
+<<<<<<< HEAD
             let holdings = match inspect(path, &files).outcome {
+=======
+            let holdings = match inspect(path, resample).outcome {
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
                 Outcome::Read(holdings) => holdings,
                 Outcome::Own => return Err((format!("{} is a result of afmid's", path.display()), None)),
                 Outcome::Refused { problem, help, .. } => return Err((format!("{}: {problem}", path.display()), help)),
@@ -93,7 +103,11 @@ impl<'a> Files<'a> {
             channels.push(named.map(|(channel, location)| Channel { location, ..channel }).collect());
         }
         let remarks = opened.contents().remarks.clone();
+<<<<<<< HEAD
         Ok(Self { paths, files, opened, channels, remarks })
+=======
+        Ok(Self { paths, opened, channels, remarks, resample })
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
     }
 
     /// The channel that is meant: `FILE:CHANNEL`, a file with one signal, or a channel that one file has.
@@ -176,6 +190,7 @@ impl<'a> Files<'a> {
             remarks: self.remarks,
             files: vec![file.clone()],
             joined: self.paths.get(1..).unwrap_or_default().to_vec(),
+            resample: self.resample,
             rate_hz: None,
             others: Vec::new(),
             skipped: Vec::new(),

@@ -25,6 +25,7 @@ pub struct Wanted<'a> {
     pub records_are: Option<RecordsAre>,
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
+    pub resample: bool,
 }
 
 impl Goal {
@@ -171,6 +172,9 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     if matches!(choice.goal, Goal::Decay | Goal::Thermal | Goal::Steady) {
         params.insert("piezo_channel".to_owned(), text(""));
     }
+    if source.resample {
+        params.insert("resample".to_owned(), Value::Boolean(true));
+    }
     if let Some(rate) = stated::rate(source, channel, &wanted, true)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
@@ -230,6 +234,9 @@ pub fn columns(
         1 => params.insert("output".to_owned(), text(&output.location)),
         _ => params.insert("outputs".to_owned(), Value::Array(choice.channels.iter().map(location).collect())),
     };
+    if source.resample {
+        params.insert("resample".to_owned(), Value::Boolean(true));
+    }
     if let Some(rate) = stated::rate(source, output, &wanted, false)? {
         params.insert("sample_rate_hz".to_owned(), Value::Float(rate));
     }
@@ -272,6 +279,7 @@ mod tests {
             remarks: Vec::new(),
             files: vec![PathBuf::from("/lab/years/2004/a.tdms"); 3],
             joined: Vec::new(),
+            resample: false,
             rate_hz: rate,
             others: Vec::new(),
             skipped: Vec::new(),
@@ -283,7 +291,15 @@ mod tests {
         [Goal::Decay, Goal::SnapOff, Goal::Ringdown, Goal::Diagnosis, Goal::Coupled, Goal::Thermal, Goal::Steady];
 
     fn wanted(goal: Goal) -> Wanted<'static> {
-        Wanted { goal: Some(goal), channels: &[], inputs: &[], records_are: None, rate_hz: None, unit: None }
+        Wanted {
+            goal: Some(goal),
+            channels: &[],
+            inputs: &[],
+            records_are: None,
+            rate_hz: None,
+            unit: None,
+            resample: false,
+        }
     }
 
     /// The config for the first channel.

@@ -69,7 +69,11 @@ impl Blocks {
         let mut blocks = Self { samples: usize::MAX, before: BEFORE };
         let force = choice.inputs.first().map(|input| input.location.as_str()).unwrap_or_default();
         let forces: Vec<Vec<f64>> =
+<<<<<<< HEAD
             source.files.iter().map(|file| series(&source.opened, file, force)).collect::<Result<_, _>>()?;
+=======
+            source.files.iter().map(|file| series(file, force, source.resample)).collect::<Result<_, _>>()?;
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
         if choice.struck {
             blocks.before = forces.iter().map(|force| hit_begins(force, HIT)).fold(BEFORE, usize::min);
         }
@@ -99,9 +103,15 @@ impl Blocks {
 }
 
 /// A channel of a file. Errors: it is not there or cannot be read.
+<<<<<<< HEAD
 fn series(files: &InputFiles, file: &Path, location: &str) -> Result<Vec<f64>, Question> {
     let plain = |problem: String| (format!("{}: {problem}", file.display()), None);
     let opened = open_unpacked(files, file, &Reading::of("auto", None));
+=======
+fn series(file: &Path, location: &str, resample: bool) -> Result<Vec<f64>, Question> {
+    let plain = |problem: String| (format!("{}: {problem}", file.display()), None);
+    let opened = open_unpacked(&InputFiles::new(), file, &Reading::of("auto", None).resampled(resample));
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
     let opened = opened.map_err(|error| plain(error.problem))?;
     let found = opened.contents.channels.iter().find(|channel| channel.location == location);
     let found = found.ok_or_else(|| plain(format!("there is no channel {location}")))?;

@@ -29,6 +29,8 @@ pub struct Source {
     pub files: Vec<PathBuf>,
     /// Further files of the measurement in the first one, where input and output are in files of their own.
     pub joined: Vec<PathBuf>,
+    /// Whether channels whose clock wanders are put on an even grid.
+    pub resample: bool,
     /// The rate that they share, where they state one and others were given with them.
     pub rate_hz: Option<f64>,
     /// Recordings of other kinds, which are left out.
@@ -58,7 +60,11 @@ impl Source {
 pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> {
     let listed = listed(paths)?;
     if let [(only, true)] = &listed[..] {
+<<<<<<< HEAD
         return source(InputFiles::new(), Groups::default(), vec![only.clone()], vec![only.clone()], None);
+=======
+        return source(Groups::default(), vec![only.clone()], vec![only.clone()], None, wanted.resample);
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
     }
     let opened = InputFiles::new();
     let mut groups = Groups::of(&listed, wanted, &opened)?;
@@ -67,7 +73,11 @@ pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> 
     groups.all.sort_by_key(|group| std::cmp::Reverse(group.files.len()));
     let (rate_hz, files) = (chosen.rate_hz(), chosen.files);
     let patterns = paths.iter().flat_map(|path| patterns(path, &files, &groups.own)).collect();
+<<<<<<< HEAD
     source(opened, groups, files, patterns, rate_hz)
+=======
+    source(groups, files, patterns, rate_hz, wanted.resample)
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
 }
 
 /// All files. Errors: a path that is not there, a folder without files.
@@ -100,7 +110,11 @@ fn none(paths: &[PathBuf], groups: &Groups) -> Question {
     let own = (!groups.own.is_empty()).then(|| format!("{} are results of afmid's", groups.own.len()));
     let reasons: Vec<String> = groups.skipped.iter().take(MOST).map(reason).chain(own).collect();
     let names: Vec<String> = paths.iter().take(MOST).map(|path| path.display().to_string()).collect();
+<<<<<<< HEAD
     let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, &InputFiles::new()).outcome {
+=======
+    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, false).outcome {
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
         Outcome::Refused { help, .. } => help,
         _ => None,
     });
@@ -129,9 +143,14 @@ fn source(
     files: Vec<PathBuf>,
     patterns: Vec<PathBuf>,
     rate_hz: Option<f64>,
+    resample: bool,
 ) -> Result<Source, Question> {
     let first = files.first().cloned().ok_or_else(|| ("there are no recordings".to_owned(), None))?;
+<<<<<<< HEAD
     let inspected = inspect(&first, &opened);
+=======
+    let inspected = inspect(&first, resample);
+>>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
     match inspected.outcome {
         Outcome::Read(holdings) => Ok(Source {
             patterns,
@@ -142,6 +161,7 @@ fn source(
             channels: holdings.channels,
             files,
             joined: Vec::new(),
+            resample,
             rate_hz,
             others: groups.all,
             skipped: groups.skipped,

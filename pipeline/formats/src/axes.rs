@@ -21,6 +21,7 @@ use crate::{Contents, FoundChannel};
 use std::collections::HashMap;
 
 mod mean_rate;
+pub(crate) use mean_rate::times_beside;
 pub use mean_rate::{contradiction, mean_rate};
 
 /// Names of arrays of frequencies, in lower case, but for the unit at their ends.

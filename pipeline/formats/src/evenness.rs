@@ -208,7 +208,9 @@ impl<'a> Times<'a> {
             return format!("it steps by {:.6e} on average, not by {step:.6e}", line.step);
         }
         let (row, off) = (self.row + line.row + 1, line.off_steps);
-        format!("it wanders: row {row} is furthest from the even grid, by {off:.3} steps, wanted {MOST_OFF_STEPS}")
+        format!(
+            "it wanders: row {row} is furthest from the even grid, by {off:.3} steps, wanted {MOST_OFF_STEPS}; `resample` (--resample) puts it on one"
+        )
     }
 
     /// The same where times may jump: each stretch by itself. Errors: why they are not even.

@@ -31,6 +31,7 @@ mod rate;
 mod raw;
 pub mod readers;
 mod regular;
+mod resample;
 mod responses;
 mod straight;
 mod text;
@@ -58,6 +59,7 @@ pub use raw::Raw;
 pub use readers::raw_binary::{RawBinary, SampleType};
 pub use readers::{HEAD_BYTES, Known, formats, head_of, recognise};
 pub use regular::{append_regular, open_regular, read_regular};
+pub use resample::is_of_resampling;
 pub use responses::{
     Degree, FoundResponse, Frequencies, Parts, gains_without_phase, responses, says_frequencies, unit_ratio,
 };

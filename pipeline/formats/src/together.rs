@@ -168,7 +168,7 @@ fn weights(fraction: f64) -> Vec<f64> {
 }
 
 /// The modified Bessel function of order 0, by its power series, which converges for every argument.
-fn bessel_i0(x: f64) -> f64 {
+pub(crate) fn bessel_i0(x: f64) -> f64 {
     let quarter = 0.25 * x * x;
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 1..100 {

@@ -36,6 +36,9 @@ pub fn open_contents(
         },
     };
     contents.refuse_odd_rates();
+    if reading.resample {
+        contents.resample().map_err(|error| error.in_file(path))?;
+    }
     begin_together(&mut contents, &reading.together).map_err(|error| error.in_file(path))?;
     Ok((name, contents))
 }

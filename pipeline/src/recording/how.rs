@@ -37,11 +37,14 @@ pub struct Reading {
     /// Channels that the file begins at different instants and that are put together: each begins with the last of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub together: Vec<String>,
+    /// Whether channels whose clock wanders are put on an even grid.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub resample: bool,
 }
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { format: NATIVE.to_owned(), raw: None, together: Vec::new() }
+        Self { format: NATIVE.to_owned(), raw: None, together: Vec::new(), resample: false }
     }
 }
 
@@ -49,7 +52,13 @@ impl Reading {
     /// Whatever recognises a file; raw binary if that is described.
     pub fn of(format: &str, raw: Option<RawBinary>) -> Self {
         let format = if raw.is_some() && format == AUTO { RAW } else { format };
-        Self { format: format.to_owned(), raw, together: Vec::new() }
+        Self { format: format.to_owned(), raw, ..Self::default() }
+    }
+
+    /// The same, with channels whose clock wanders on an even grid.
+    #[must_use]
+    pub fn resampled(self, resample: bool) -> Self {
+        Self { resample, ..self }
     }
 
     /// All names of formats.

@@ -60,7 +60,7 @@ pub fn open_records(files: &InputFiles, path: &Path, wanted: &[Wanted], how: &Ho
         }
         return Ok(Opened { format: NATIVE, records: vec![record], remarks });
     }
-    let mut reading = Reading::of(format, how.reading.raw.clone());
+    let mut reading = Reading::of(format, how.reading.raw.clone()).resampled(how.reading.resample);
     let (state, inspected) = files.inspect(path)?;
     let mut held = contents(files, path, state, &reading)?;
     let moved = apart(&held, wanted).map_err(|error| error.at(path))?;

@@ -12,15 +12,25 @@ const CONTRADICTS: f64 = 1e-2;
 ///
 /// Errors are none: times that cannot be read say nothing.
 pub fn mean_rate<'a>(channels: &'a [FoundChannel], of: &FoundChannel) -> Option<(f64, &'a str)> {
+    let (axis, unit_s) = times_beside(channels, of).filter(|_| of.sample_rate_hz.is_none())?;
+    Some((rate_of(axis, unit_s)?, axis.location.as_str()))
+}
+
+/// The axis of times of a channel's length, and the seconds of its unit; none where there is none, or it counts.
+pub(crate) fn times_beside<'a>(channels: &'a [FoundChannel], of: &FoundChannel) -> Option<(&'a FoundChannel, f64)> {
     let beside = channels.iter().filter(|axis| axis.is_axis && axis.samples == of.samples && axis.samples > 1);
-    let mut times = beside.filter_map(|axis| Some((axis, seconds_in(axis)?)));
-    let (axis, unit_s) = times.next().filter(|_| of.sample_rate_hz.is_none())?;
+    let (axis, unit_s) = beside.filter_map(|axis| Some((axis, seconds_in(axis)?))).next()?;
+    rate_of(axis, unit_s).map(|_| (axis, unit_s))
+}
+
+/// The mean rate of an axis; none where it does not rise, or counts.
+fn rate_of(axis: &FoundChannel, unit_s: f64) -> Option<f64> {
     let at = |row: usize| Some(axis.source.read(row, 1).ok()?.widened().first()? * axis.scale_factor);
     let step = (at(axis.samples - 1)? - at(0)?) / (axis.samples - 1) as f64;
     // whole numbers without a unit count samples
     let counts = axis.unit.is_empty() && step.fract() == 0.0;
     let rate = (step * unit_s).recip();
-    (!counts && rate.is_finite() && rate > 0.0).then_some((rate, axis.location.as_str()))
+    (!counts && rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
 /// That a rate which the user gives is not that of the times beside a channel; none where it agrees, or none are there.

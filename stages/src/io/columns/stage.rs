@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use afmid_pipeline::recording::{Measurement, RawBinary, Reading};
+use afmid_pipeline::recording::{Measurement, RawBinary, Reading, is_of_resampling};
 use afmid_pipeline::{Array, Context, Document, Example, Faults, InputFiles, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,6 +81,10 @@ pub struct Columns {
     /// Channel of the time in seconds, for the sample rate; equally spaced to 1 %, or to half a unit of its last
     /// digit. For files whose time axis is not titled as one.
     pub time: Option<Column>,
+    /// Whether samples of a clock that wanders, a stamp by more than a hundredth of a step, are put on an even grid by
+    /// interpolation (docs/archives.md): amplitudes are right to 1 % up to a quarter of the rate; gaps stay gaps. Default:
+    /// false. Why: the true times of such stamps are not known to be right.
+    pub resample: bool,
     /// Stretch to fit, as first sample (from 0) and one past the last. Absent: the first half.
     pub identification: Option<[usize; 2]>,
     /// Stretch to judge on. Absent: the second half.
@@ -115,6 +119,7 @@ impl Default for Columns {
             raw: None,
             sample_rate_hz: None,
             time: None,
+            resample: false,
             identification: None,
             verification: None,
             remove: Removal::Mean,
@@ -225,7 +230,10 @@ impl Columns {
         let mut parts: Vec<(PathBuf, Part)> = Vec::with_capacity(measurements.len());
         let mut copies: Vec<CopyOf> = Vec::new();
         for paths in measurements {
-            let file = Measurement::open(cx.files(), &paths, &Reading::of(&self.format, self.raw.clone()))?;
+            let reading = Reading::of(&self.format, self.raw.clone()).resampled(self.resample);
+            let file = Measurement::open(cx.files(), &paths, &reading)?;
+            let wander = file.contents().remarks.iter().filter(|remark| self.resample && is_of_resampling(remark));
+            wander.for_each(|remark| cx.warn(remark.clone()));
             let path = paths.into_iter().next().unwrap_or_default();
             let part = Part::read(self, &file).and_then(|part| part.like(parts.first().map(|(_, first)| first)));
             // channels of several files are named with theirs
