@@ -72,7 +72,7 @@ pub fn exit_code(registry: &Registry) -> u8 {
 
 /// What `inspect --json` says of a file, as JSON text.
 pub fn inspect_json(path: &Path) -> String {
-    inspect::inspected_json(&inspect::inspect(path, &InputFiles::new())).to_string()
+    inspect::inspected_json(&inspect::inspect(path, &InputFiles::new(), false)).to_string()
 }
 
 /// How a program ends whose stages do not make a registry.

@@ -13,9 +13,9 @@ import pytest
 # without the native module the package reads results, and no more
 NATIVE = ("_program", "__main__", "artifacts", "decays", "diagnoses", "identification", "reading", "running")
 collect_ignore_glob = (
-    [*(f"src/afmid/{name}.py" for name in NATIVE), "src/afmid/__init__.py", "tests_native/*"]
+    [*(f"src/afmid/{name}.py" for name in NATIVE), "src/afmid/__init__.py"]
     if importlib.util.find_spec("afmid._native") is None
-    else ["tests_native/*"]
+    else []
 )
 
 

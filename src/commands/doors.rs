@@ -41,11 +41,7 @@ pub fn say_of_config(text: &str, set: &[String], registry: &Registry) -> String 
 
 /// All that `inspect` says of a file, for people and for scripts.
 pub fn say_of_recording(path: &Path) -> String {
-<<<<<<< HEAD
-    let inspected = inspect(path, &InputFiles::new());
-=======
-    let inspected = inspect(path, false);
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    let inspected = inspect(path, &InputFiles::new(), false);
     let json = inspected_json(&inspected).to_string();
     file_text(&inspected) + &folder_text(path, &[inspected]) + &json
 }

@@ -20,11 +20,8 @@ pub fn run(paths: &[PathBuf], resample: bool, as_json: bool) -> Result<(), Failu
             |error: std::io::Error| Failure::failed(format!("{} cannot be listed: {error}", path.display()), None);
         let files = if path.is_dir() { files_of(path).map_err(cannot)? } else { vec![path.clone()] };
         // in parallel, printed in their order
-<<<<<<< HEAD
-        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file, &InputFiles::new())).collect();
-=======
-        let inspected: Vec<Inspected> = files.par_iter().map(|file| inspect(file, resample)).collect();
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+        let inspected: Vec<Inspected> =
+            files.par_iter().map(|file| inspect(file, &InputFiles::new(), resample)).collect();
         if !as_json {
             print(&text(path, &inspected))?;
         }

@@ -55,24 +55,16 @@ pub enum Outcome {
     },
 }
 
-<<<<<<< HEAD
-/// Looks at a file: what it holds, and every sample of it once. `files` keeps what was parsed.
-pub fn inspect(path: &Path, files: &InputFiles) -> Inspected {
-=======
-/// Looks at a file: what it holds, and every sample of it once.
-/// `resample`: with channels whose clock wanders on an even grid.
-pub fn inspect(path: &Path, resample: bool) -> Inspected {
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+/// Looks at a file: what it holds, and every sample of it once. `files` keeps what was parsed; `resample`: with channels
+/// whose clock wanders on an even grid.
+pub fn inspect(path: &Path, files: &InputFiles, resample: bool) -> Inspected {
     let size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
     let outcome = match files.is_result(path) {
         Ok(true) => Outcome::Own,
-<<<<<<< HEAD
-        _ => read(path, files).map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings))),
-=======
         _ => {
-            read(path, resample).map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings)))
+            let found = read(path, files, resample);
+            found.map_or_else(|error| refused(path, error), |holdings| Outcome::Read(Box::new(holdings)))
         }
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
     };
     Inspected { file: path.to_owned(), size_bytes, outcome }
 }
@@ -90,13 +82,8 @@ fn is_no_recording(path: &Path) -> bool {
     read.is_ok() && !head.is_empty() && head != GZIP && !recognised(path)
 }
 
-<<<<<<< HEAD
-fn read(path: &Path, files: &InputFiles) -> Result<Holdings, StageError> {
-    let opened = open_unpacked(files, path, &Reading::of("auto", None))?;
-=======
-fn read(path: &Path, resample: bool) -> Result<Holdings, StageError> {
-    let opened = open_unpacked(&InputFiles::new(), path, &Reading::of("auto", None).resampled(resample))?;
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+fn read(path: &Path, files: &InputFiles, resample: bool) -> Result<Holdings, StageError> {
+    let opened = open_unpacked(files, path, &Reading::of("auto", None).resampled(resample))?;
     let contents = &opened.contents;
     let channels = contents.channels.iter().enumerate();
     let mut channels: Vec<Channel> =

@@ -44,11 +44,7 @@ impl<'a> FirstFile<'a> {
 
     fn contents(&self) -> Result<&Contents, String> {
         let open = || {
-<<<<<<< HEAD
-            let (files, reading) = (&self.source.opened, Reading::of("auto", None));
-=======
-            let (files, reading) = (InputFiles::new(), Reading::of("auto", None).resampled(self.source.resample));
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+            let (files, reading) = (&self.source.opened, Reading::of("auto", None).resampled(self.source.resample));
             let opened = if self.source.joined.is_empty() {
                 open_unpacked(files, &self.source.file, &reading).map(Opened::File)
             } else {

@@ -201,11 +201,7 @@ fn kind((path, given): &Listed, wanted: &Wanted<'_>, files: &InputFiles) -> Resu
     if matches!(files.is_result(path), Ok(true)) {
         return Ok(Kind::Own);
     }
-<<<<<<< HEAD
-    let opened = match open_unpacked(files, path, &Reading::of("auto", None)) {
-=======
-    let opened = match open_unpacked(&files, path, &Reading::of("auto", None).resampled(wanted.resample)) {
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    let opened = match open_unpacked(files, path, &Reading::of("auto", None).resampled(wanted.resample)) {
         Ok(opened) => opened,
         Err(error) if *given => return Err((format!("{}: {}", path.display(), error.problem), error.help)),
         Err(error) if recognised(path) => return Ok(Kind::None(error.problem)),

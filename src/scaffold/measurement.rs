@@ -78,23 +78,14 @@ struct Files<'a> {
 }
 
 impl<'a> Files<'a> {
-<<<<<<< HEAD
-    fn open(paths: &'a [PathBuf]) -> Result<Self, Question> {
-        let files = InputFiles::new();
-        let opened = Measurement::open(&files, paths, &Reading::of("auto", None));
-=======
     fn open(paths: &'a [PathBuf], resample: bool) -> Result<Self, Question> {
-        let opened = Measurement::open(&InputFiles::new(), paths, &Reading::of("auto", None).resampled(resample));
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+        let files = InputFiles::new();
+        let opened = Measurement::open(&files, paths, &Reading::of("auto", None).resampled(resample));
         let opened = opened.map_err(|error| (error.to_string(), error.help.clone()))?;
         let mut names = opened.contents().channels.iter().map(|channel| channel.location.clone());
         let mut channels = Vec::new();
         for path in paths {
-<<<<<<< HEAD
-            let holdings = match inspect(path, &files).outcome {
-=======
-            let holdings = match inspect(path, resample).outcome {
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+            let holdings = match inspect(path, &files, resample).outcome {
                 Outcome::Read(holdings) => holdings,
                 Outcome::Own => return Err((format!("{} is a result of afmid's", path.display()), None)),
                 Outcome::Refused { problem, help, .. } => return Err((format!("{}: {problem}", path.display()), help)),
@@ -103,11 +94,7 @@ impl<'a> Files<'a> {
             channels.push(named.map(|(channel, location)| Channel { location, ..channel }).collect());
         }
         let remarks = opened.contents().remarks.clone();
-<<<<<<< HEAD
-        Ok(Self { paths, files, opened, channels, remarks })
-=======
-        Ok(Self { paths, opened, channels, remarks, resample })
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+        Ok(Self { paths, files, opened, channels, remarks, resample })
     }
 
     /// The channel that is meant: `FILE:CHANNEL`, a file with one signal, or a channel that one file has.

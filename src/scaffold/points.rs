@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use afmid_kernels::spectra::{hit_begins, hit_spacing};
-use afmid_pipeline::recording::{InputFiles, Reading, open_unpacked};
+use afmid_pipeline::recording::{Reading, open_unpacked};
 use afmid_pipeline::toml::{Table, Value};
 
 use super::choice::{Choice, Question};
@@ -69,11 +69,7 @@ impl Blocks {
         let mut blocks = Self { samples: usize::MAX, before: BEFORE };
         let force = choice.inputs.first().map(|input| input.location.as_str()).unwrap_or_default();
         let forces: Vec<Vec<f64>> =
-<<<<<<< HEAD
-            source.files.iter().map(|file| series(&source.opened, file, force)).collect::<Result<_, _>>()?;
-=======
-            source.files.iter().map(|file| series(file, force, source.resample)).collect::<Result<_, _>>()?;
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+            source.files.iter().map(|file| series(source, file, force)).collect::<Result<_, _>>()?;
         if choice.struck {
             blocks.before = forces.iter().map(|force| hit_begins(force, HIT)).fold(BEFORE, usize::min);
         }
@@ -103,15 +99,9 @@ impl Blocks {
 }
 
 /// A channel of a file. Errors: it is not there or cannot be read.
-<<<<<<< HEAD
-fn series(files: &InputFiles, file: &Path, location: &str) -> Result<Vec<f64>, Question> {
+fn series(source: &Source, file: &Path, location: &str) -> Result<Vec<f64>, Question> {
     let plain = |problem: String| (format!("{}: {problem}", file.display()), None);
-    let opened = open_unpacked(files, file, &Reading::of("auto", None));
-=======
-fn series(file: &Path, location: &str, resample: bool) -> Result<Vec<f64>, Question> {
-    let plain = |problem: String| (format!("{}: {problem}", file.display()), None);
-    let opened = open_unpacked(&InputFiles::new(), file, &Reading::of("auto", None).resampled(resample));
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    let opened = open_unpacked(&source.opened, file, &Reading::of("auto", None).resampled(source.resample));
     let opened = opened.map_err(|error| plain(error.problem))?;
     let found = opened.contents.channels.iter().find(|channel| channel.location == location);
     let found = found.ok_or_else(|| plain(format!("there is no channel {location}")))?;

@@ -60,11 +60,8 @@ impl Source {
 pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> {
     let listed = listed(paths)?;
     if let [(only, true)] = &listed[..] {
-<<<<<<< HEAD
-        return source(InputFiles::new(), Groups::default(), vec![only.clone()], vec![only.clone()], None);
-=======
-        return source(Groups::default(), vec![only.clone()], vec![only.clone()], None, wanted.resample);
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+        let one = vec![only.clone()];
+        return source(InputFiles::new(), Groups::default(), one.clone(), one, None, wanted.resample);
     }
     let opened = InputFiles::new();
     let mut groups = Groups::of(&listed, wanted, &opened)?;
@@ -73,11 +70,7 @@ pub fn look(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Source, Question> 
     groups.all.sort_by_key(|group| std::cmp::Reverse(group.files.len()));
     let (rate_hz, files) = (chosen.rate_hz(), chosen.files);
     let patterns = paths.iter().flat_map(|path| patterns(path, &files, &groups.own)).collect();
-<<<<<<< HEAD
-    source(opened, groups, files, patterns, rate_hz)
-=======
-    source(groups, files, patterns, rate_hz, wanted.resample)
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    source(opened, groups, files, patterns, rate_hz, wanted.resample)
 }
 
 /// All files. Errors: a path that is not there, a folder without files.
@@ -110,11 +103,7 @@ fn none(paths: &[PathBuf], groups: &Groups) -> Question {
     let own = (!groups.own.is_empty()).then(|| format!("{} are results of afmid's", groups.own.len()));
     let reasons: Vec<String> = groups.skipped.iter().take(MOST).map(reason).chain(own).collect();
     let names: Vec<String> = paths.iter().take(MOST).map(|path| path.display().to_string()).collect();
-<<<<<<< HEAD
-    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, &InputFiles::new()).outcome {
-=======
-    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, false).outcome {
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    let known = groups.skipped.first().and_then(|(path, _)| match inspect(path, &InputFiles::new(), false).outcome {
         Outcome::Refused { help, .. } => help,
         _ => None,
     });
@@ -146,11 +135,7 @@ fn source(
     resample: bool,
 ) -> Result<Source, Question> {
     let first = files.first().cloned().ok_or_else(|| ("there are no recordings".to_owned(), None))?;
-<<<<<<< HEAD
-    let inspected = inspect(&first, &opened);
-=======
-    let inspected = inspect(&first, resample);
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    let inspected = inspect(&first, &opened, resample);
     match inspected.outcome {
         Outcome::Read(holdings) => Ok(Source {
             patterns,

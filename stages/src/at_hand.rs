@@ -5,17 +5,9 @@ use std::sync::Arc;
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Array, Channel, Recording, StageError};
 
-use crate::artifacts::{Sensor, decay_array};
+pub use crate::artifacts::Sensor as Named;
+use crate::artifacts::decay_array;
 use crate::io::{MemorySource, columns_at_hand, memory_record};
-
-/// A channel's name and unit.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Named {
-    /// As people know it.
-    pub name: String,
-    /// Its unit; empty where it is not known.
-    pub unit: String,
-}
 
 /// What `io.records` hands on: records of as many samples in each of these channels. Errors: a record with another
 /// number of channels than names.
@@ -48,8 +40,7 @@ pub fn recording(
 /// [`recording`].
 pub fn decays(hits: &[Vec<Vec<f64>>], channels: &[Named], sample_rate_hz: f64) -> Result<Array, StageError> {
     hits.iter().try_for_each(|hit| as_many(hit.len(), channels))?;
-    let sensor = |named: &Named| Sensor { name: named.name.clone(), unit: named.unit.clone() };
-    decay_array(hits, &[], &channels.iter().map(sensor).collect::<Vec<_>>(), sample_rate_hz)
+    decay_array(hits, &[], channels, sample_rate_hz)
 }
 
 /// What `io.columns` hands on for these inputs and outputs with these parameters of its own (`remove`, ...), and what it

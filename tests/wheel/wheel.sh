@@ -21,4 +21,6 @@ python lines.py
 afmid --version
 echo "== tests and examples"
 python -m pip install --quiet --disable-pip-version-check pytest
-python -m pytest -q -p no:cacheprovider "$root/python/afmid/tests_native"
+python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
+examples=(afmid.arrays_at_hand afmid.decays afmid.diagnoses afmid.identification afmid.numbers afmid.reading afmid.running)
+python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

@@ -25,7 +25,7 @@ pub fn names_of_files(paths: &[PathBuf]) -> Result<Vec<String>, FormatError> {
     match called.iter().enumerate().find(|(number, name)| called.iter().take(*number).any(|other| other == *name)) {
         None => Ok(called),
         Some((_, name)) => Err(FormatError::new(
-            format!("two files of one measurement are called {name}: their channels cannot be told apart"),
+            format!("two files of one measurement are called {name}: nothing tells their channels apart"),
             "name each file once, files of other folders by another name",
         )),
     }
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_one_name_are_told_apart_by_their_folders() {
+    fn files_of_one_name_have_their_folders_names() {
         let of = |paths: [&str; 2]| names_of_files(&paths.map(PathBuf::from));
         assert_eq!(of(["in/a.csv", "out/b.csv"]).unwrap(), ["a.csv", "b.csv"]);
         assert_eq!(of(["in/a.csv", "out/a.csv"]).unwrap(), ["in/a.csv", "out/a.csv"]);

@@ -208,10 +208,11 @@ pub(crate) fn shortest(step: f64) -> f64 {
     if f64::from(single) == step { single.to_string().parse().unwrap_or(step) } else { step }
 }
 
-/// The number that all of several are: of each channel the same rate.
+/// The number that all of several are: of each channel the same rate. What is no number is one too, so that it is said.
 pub fn one_number(numbers: &[f64]) -> Option<f64> {
     let first = *numbers.first()?;
-    numbers.iter().all(|number| *number == first).then_some(first)
+    let same = |number: &f64| *number == first || number.is_nan() && first.is_nan();
+    numbers.iter().all(same).then_some(first)
 }
 
 /// A number that is named like a sampling rate, an interval or the instant of the first sample.

@@ -43,15 +43,9 @@ pub use write::{Codes, NativeChannel, NativeRecord, RecordStorage, write_native,
 
 pub use afmid_formats::{
     Contents, Degree, FormatError, FoundChannel, FoundResponse, Parts, Raw, RawBinary, Row, Source, WANTED_RATE,
-<<<<<<< HEAD
-    begun_together, brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact, is_rate,
-    joined, lane_names, mean_rate, most_inflated, names_of_files, one_rate, put_together, rates_agree, responses,
-    says_frequencies, unit_ratio,
-=======
     begun_together, brief_number, contradiction, even_step, formats, gains_without_phase, hertz, is_fact,
     is_of_resampling, is_rate, joined, lane_names, mean_rate, most_inflated, names_of_files, one_rate, put_together,
-    responses, says_frequencies, unit_ratio,
->>>>>>> 5dfd26fd ([formats, recording, io, new, inspect] a clock that wanders is resampled where --resample says so)
+    rates_agree, responses, says_frequencies, unit_ratio,
 };
 pub use contents::{UnpackedContents, is_hdf5_file, open_contents, open_unpacked};
 pub use equal::{SamplePrint, equal_samples};

@@ -3,8 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::model::ModelError;
-
 /// Kernels that fit many times call it from any thread, between fits.
 ///
 /// ```
@@ -51,12 +49,9 @@ impl Watch {
         Self(Some(monitor))
     }
 
-    /// Errors: the monitor wants the fit to end.
-    pub fn check(&self) -> Result<(), ModelError> {
-        match &self.0 {
-            Some(monitor) if monitor.is_cancelled() => Err(ModelError::Cancelled),
-            _ => Ok(()),
-        }
+    /// Whether the fit shall end with an error instead of a result.
+    pub fn is_cancelled(&self) -> bool {
+        self.0.as_ref().is_some_and(|monitor| monitor.is_cancelled())
     }
 }
 

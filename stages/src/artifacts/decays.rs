@@ -20,9 +20,10 @@ const QUIET_SAMPLES: &str = "quiet_samples";
 
 /// A channel of all hits: a sensor.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Sensor {
+pub struct Sensor {
     /// As the file names it.
     pub name: String,
+    /// Its unit; empty where it is not known.
     pub unit: String,
 }
 

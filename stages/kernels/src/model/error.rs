@@ -82,6 +82,11 @@ pub enum ModelError {
     Cancelled,
 }
 
+/// Errors: who watches wants the work to end.
+pub(crate) fn go_on(watch: &crate::Watch) -> Result<(), ModelError> {
+    if watch.is_cancelled() { Err(ModelError::Cancelled) } else { Ok(()) }
+}
+
 /// Checks that a series is finite. Errors: [`ModelError::NotFinite`].
 pub(crate) fn finite(what: &'static str, values: &[f64]) -> Result<(), ModelError> {
     match values.iter().position(|value| !value.is_finite()) {

@@ -25,7 +25,7 @@ mod riccati;
 mod transmission;
 
 pub use error::ModelError;
-pub(crate) use error::finite;
+pub(crate) use error::{finite, go_on};
 pub(crate) use innovations::kalman_gains;
 pub use innovations::{InnovationsModel, InputGains, Section};
 pub use parametrisation::held_apart;

@@ -12,7 +12,7 @@ use super::options::PemOptions;
 use super::predictor::Problem;
 use super::secant::{Secant, Taken};
 use super::state::{Memory, State};
-use crate::model::{LIMIT, ModelError, coordinates, roots, section_order};
+use crate::model::{LIMIT, ModelError, coordinates, go_on, roots, section_order};
 use crate::optimise::{self, Damping, Ending, Objective, Trial, descend, shortened};
 
 /// Limits of an iteration.
@@ -125,7 +125,7 @@ impl Objective for PredictionErrors<'_, '_> {
     }
 
     fn local(&mut self, at: &mut State) -> Result<Option<Local>, ModelError> {
-        self.problem.watch.check()?;
+        go_on(&self.problem.watch)?;
         let coordinates = at.point.coordinates();
         let linearised = Linearised::new(&at.sensitivities(self.problem)?, &coordinates)?;
         at.gradient = linearised.share() / at.projection.cost.sqrt();

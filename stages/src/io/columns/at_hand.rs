@@ -6,7 +6,7 @@ use super::part::Part;
 use super::selection::Column;
 use super::series::Series;
 use super::stage::Columns;
-use crate::at_hand::Named;
+use crate::artifacts::Sensor as Named;
 
 /// The pair that the stage hands on of these series with these parameters, and what it warns of. Errors: a parameter
 /// that is none; as the stage.

@@ -8,7 +8,7 @@ use afmid_pipeline::recording::{
 
 use super::selection::Column;
 use super::stage::Columns;
-use crate::at_hand::Named;
+use crate::artifacts::Sensor as Named;
 use crate::io::repeats::{same_values, varies};
 
 /// Inputs and outputs of one measurement in their units, NaN where missing.

@@ -8,7 +8,7 @@ use super::noise::{NoiseModel, degrees, first_noise, rescaled};
 use super::options::{ChannelNoise, ChannelOptions, ModesWanted};
 use super::records::Records;
 use super::result::{ChannelRingdown, OrderTried};
-use crate::model::{ModelError, finite};
+use crate::model::{ModelError, finite, go_on};
 use crate::ringdown::RingdownNoise;
 use crate::statistics::chi_square_tail;
 use faer::c64;
@@ -70,7 +70,7 @@ pub fn fit_channels(
     for stretch in free.iter().flatten() {
         finite("free stretch", stretch)?;
     }
-    options.watch.check()?;
+    go_on(&options.watch)?;
     let records = Records::of(events, interval_s, options)?;
     let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
     let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
@@ -244,7 +244,7 @@ impl Ladder<'_> {
         let mut best: Option<Step> = None;
         let mut place = 0;
         for modes in 1..=most {
-            self.options.watch.check()?;
+            go_on(&self.options.watch)?;
             let Some(next) = self.next(&current, all_noise.take().as_deref(), modes <= least) else { break };
             let places = &next.fitted.poles.0[place.min(modes - 1)..];
             let white = self.white_gain(&needed, &next, places);
