@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 RATE_HZ = 5e4
-# frequency, quality factor, amplitude at the two sensors
+# undamped frequency, quality factor, amplitude at the two sensors
 MODES = [(440.0, 60.0, (1.0, 0.5)), (1210.0, 90.0, (0.6, -0.9))]
+
+
+def wave(frequency_hz, quality_factor, time):
+    """A free decay of that pole: `abs(s) = 2 pi f`, `-2 Re(s) = abs(s) / Q`."""
+    omega, rate = 2 * np.pi * frequency_hz, np.pi * frequency_hz / quality_factor
+    return np.exp(-rate * time) * np.sin(np.sqrt(omega**2 - rate**2) * time)
 
 
 def record(seed, quiet=2000):
     """Two sensors that see two modes after `quiet` samples, in noise of a thousandth."""
     time = np.arange(20_000 - quiet) / RATE_HZ
-    ring = [
-        sum(a[k] * np.exp(-np.pi * f / q * time) * np.sin(2 * np.pi * f * time) for f, q, a in MODES) for k in range(2)
-    ]
+    ring = [sum(a[k] * wave(f, q, time) for f, q, a in MODES) for k in range(2)]
     noise = 1e-3 * np.random.default_rng(seed).standard_normal((2, 20_000))
     return noise + np.pad(np.array(ring), ((0, 0), (quiet, 0)))
 
@@ -45,8 +49,8 @@ def test_the_same_numbers_as_the_program_bit_for_bit(afmid_cli, tmp_path):
             for name, values in zip(("tip", "root"), record(seed), strict=True):
                 file[name] = values
                 file[name].attrs["sample_rate_hz"], file[name].attrs["units"] = RATE_HZ, "V"
-        afmid_cli("new", "pipeline", "a.h5", "--goal", "decay", "-o", "a.toml", cwd=tmp_path)
-        afmid_cli("run", "a.toml", "-o", f"r{seed}.h5", cwd=tmp_path)
+        afmid_cli("new", "pipeline", "a.h5", "--goal", "decay", "-o", f"a{seed}.toml", cwd=tmp_path)
+        afmid_cli("run", f"a{seed}.toml", "-o", f"r{seed}.h5", cwd=tmp_path)
         stored = afmid.open(f"r{seed}.h5")
         names = [stage for stage in stored.stages if stored[stage].uses == "model.decay"]
         table = stored[names[0]]["modes"]

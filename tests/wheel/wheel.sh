@@ -6,7 +6,8 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 wheel=$(realpath "$1")
 python=$2
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+rm=$(command -v rm)
+trap '"$rm" -rf "$work"' EXIT
 cd "$work"
 "$python" -m venv empty
 export PATH="$work/empty/bin"

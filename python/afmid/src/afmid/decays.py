@@ -143,7 +143,7 @@ def ringdown(
     >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(4000)
     >>> decay = afmid.ringdown(np.exp(-12 * time) * np.cos(1571 * time) + noise, sample_rate_hz=1e4)
     >>> mode = decay.modes.loc[0]
-    >>> bool(abs(mode.frequency_hz - 250.03) < 0.01), bool(abs(mode.quality_factor - 65.5) < 0.2)
+    >>> bool(abs(mode.frequency_hz - 250.04) < 0.01), bool(abs(mode.quality_factor - 65.5) < 0.2)
     (True, True)
     """
     found, _ = records(y, axes)

@@ -148,7 +148,7 @@ def pem(
     ...     y[k] = 1.6 * y[k - 1] - 0.9 * y[k - 2] + 0.3 * u[k - 1]
     >>> model = afmid.pem(u, y + 0.01 * rng.standard_normal(2000), sample_rate_hz=1e3)
     >>> model.order, model.modes.frequency_hz.round(1).tolist()
-    (2, [90.4])
+    (2, [90.7])
     """
     inputs_given = np.atleast_2d(real(u, "u"))
     output_given = real(y, "y")

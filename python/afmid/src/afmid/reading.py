@@ -17,7 +17,8 @@ def read(path: str | os.PathLike[str], *, format: str = "auto") -> xr.Dataset:
 
     Channels of one clock share a coordinate `time` in seconds; those of other clocks have one of their own, `time_2`
     and so on; channels whose clock the file does not state are over `sample`. A variable's `attrs` say its `units`,
-    `long_name`, `sample_rate_hz`, and whether that rate is a guess.
+    `long_name`, `sample_rate_hz`, and whether that rate is a guess, which is a warning; `remarks` of the whole are what
+    its reader has to say.
 
     Parameters
     ----------
@@ -68,13 +69,15 @@ def read(path: str | os.PathLike[str], *, format: str = "auto") -> xr.Dataset:
         if channel["gaps"]:
             attrs["gaps"] = channel["gaps"]
         variables[channel["location"]] = xr.Variable(clocks[clock], values, attrs)
-    artifacts.warn([f"{os.fspath(path)}: {remark}" for remark in found["remarks"]])
-    attrs = {"format": found["format"], "started_at": found["started_at"]}
+    if any(channel["rate_is_guess"] for channel in found["channels"]):
+        artifacts.warn([f"{os.fspath(path)}: {remark}" for remark in found["remarks"]])
+    attrs = {"format": found["format"], "started_at": found["started_at"], "remarks": found["remarks"]}
     return xr.Dataset(variables, coordinates, attrs)
 
 
 def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a file holds, and whether it can carry a ringdown: what `afmid inspect --json` says of it.
+    """What a file holds, and whether it can carry a ringdown: what `afmid inspect --json` says of
+    each file.
 
     Parameters
     ----------
