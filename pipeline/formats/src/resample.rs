@@ -4,7 +4,7 @@
 //! off by up to a tenth of a step an amplitude is right to 1 % up to a quarter of the rate, a delay is none. Times that
 //! jump are not bridged: each stretch has a grid of its own, from its sixth stamp to its sixth last.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -67,7 +67,7 @@ impl Contents {
     /// Errors: the times do not rise, have more gaps than a clock, or no stretch that is long enough; they cannot be
     /// read.
     pub fn resample(&mut self) -> Result<(), FormatError> {
-        let mut grids: HashMap<String, (Arc<Grid>, Vec<String>)> = HashMap::new();
+        let mut grids: BTreeMap<String, (Arc<Grid>, Vec<String>)> = BTreeMap::new();
         let mut moved: Vec<(usize, FoundChannel)> = Vec::new();
         let mut too_fast = Vec::new();
         for (number, channel) in self.channels.iter().enumerate() {
@@ -94,8 +94,6 @@ impl Contents {
                 *place = channel;
             }
         }
-        let mut grids: Vec<(String, (Arc<Grid>, Vec<String>))> = grids.into_iter().collect();
-        grids.sort_by(|a, b| a.0.cmp(&b.0));
         for (axis, (grid, names)) in grids {
             self.remarks.push(format!(
                 "{axis} wanders by up to {:.3} steps (row {}): {RESAMPLED} {} Hz: {}; amplitudes are right to 1 % up \

@@ -154,8 +154,11 @@ fn text_field(name: &str, text: &str) -> (String, Vec<u8>) {
     (name.to_owned(), order.array(4, &[1, text.len() as u32], "", &order.element(16, text.as_bytes())))
 }
 
+/// Names and bytes of a struct's fields.
+type Fields = Vec<(String, Vec<u8>)>;
+
 /// A file of structs.
-fn structs(all: &[(&str, Vec<(String, Vec<u8>)>)]) -> Contents {
+fn structs(all: &[(&str, Fields)]) -> Contents {
     let order = Order(false);
     let mut bytes = order.header();
     for (name, fields) in all {

@@ -11,6 +11,9 @@ use crate::artifact::Artifact;
 use crate::errors;
 use crate::watch::watched;
 
+/// What a stage hands on, by port, and what it warns of.
+type Outcome = (Vec<(String, Artifact)>, Vec<String>);
+
 /// The stage of this name. Errors: there is none.
 fn entry(name: &str) -> PyResult<Entry> {
     let registry = afmid::registry().map_err(errors::config)?;
@@ -30,7 +33,7 @@ pub fn run_stage(
     params: &str,
     seed: u64,
     base: &str,
-) -> PyResult<(Vec<(String, Artifact)>, Vec<String>)> {
+) -> PyResult<Outcome> {
     let params: toml::Table = serde_json::from_str(params).map_err(errors::config)?;
     let stage = entry(name)?.parse(params).map_err(|error| {
         let place = if matches!(error.path.as_str(), "" | ".") { String::new() } else { format!("`{}`: ", error.path) };

@@ -287,7 +287,7 @@ fn key(name: &str) -> Option<Key> {
         let of = name.strip_suffix(*end).map(|of| of.trim_end_matches([' ', '_'])).and_then(find);
         matches!(of, Some(Key::Interval | Key::Rate))
     };
-    find(&name).or_else(|| UNITS_OF_STEPS.iter().any(|end| of_unit(&end)).then_some(Key::StepUnit))
+    find(&name).or_else(|| UNITS_OF_STEPS.iter().any(of_unit).then_some(Key::StepUnit))
 }
 
 /// A key without a unit in brackets and without `=` or `:` behind it.
