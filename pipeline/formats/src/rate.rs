@@ -134,7 +134,7 @@ const MOST_STDS: f64 = 4.0;
 /// Largest relative difference of two clocks that tell the same time: those of crystals differ by 1e-4.
 pub(crate) const ONE_CLOCK: f64 = 1e-3;
 
-/// Whether two rates are one, but for their printing and [`MOST_STDS`] of their standard errors together, relative.
+/// Whether two rates are one, but for their printing and four of their standard errors together, relative.
 pub fn rates_agree(a: f64, b: f64, relative_std: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_RATE.max(MOST_STDS * relative_std)
 }
