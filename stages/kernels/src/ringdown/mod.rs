@@ -72,6 +72,7 @@ mod knowledge_tests;
 mod ladder;
 mod limits;
 mod modal_form;
+pub mod moving;
 mod noise;
 mod noise_estimate;
 mod normal;

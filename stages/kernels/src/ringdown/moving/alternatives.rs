@@ -1,0 +1,295 @@
+//! What else a line may be: several linear modes, a mode beside a linear one, a multiple of another mode's phase.
+
+use crate::ringdown::moving::exponentials::{Pole, exponentials, solved};
+use crate::ringdown::moving::follow::{BUDGET, LEAST_DECAY, Line, Options};
+use crate::ringdown::moving::lack::{Lack, lack};
+use crate::ringdown::moving::layout::range;
+use crate::ringdown::moving::model::{MULTIPLES, Mode};
+use crate::ringdown::moving::result::Follows;
+use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit};
+use crate::ringdown::moving::select::{Rules, selected};
+use crate::ringdown::moving::terms::{Law, TERMS, values};
+use faer::c64;
+
+/// Probability of as much round a line under noise alone below which neither model holds.
+const UNEXPLAINED: f64 = 1e-6;
+/// Relative distance of a line to a multiple of another up to which it may be one.
+const NEAR_MULTIPLE: f64 = 0.01;
+/// Amplitude of a multiple over that of its mode, at most.
+const WEAK: f64 = 0.15;
+/// Share of a line's energy that a multiple of a phase explains from which on it is one: the power of the amplitude is
+/// that of weak nonlinearity.
+const EXPLAINED: f64 = 0.95;
+/// Terms beside the constants with which one mode is a plainer account than two exponentials.
+const PLAIN_TERMS: usize = 2;
+/// Difference of BIC from which on exponentials replace a mode that leaves no more than noise.
+const DECISIVE: f64 = 10.0;
+/// Gain of BIC from which on a linear mode stands beside one that moves.
+const BESIDE_GAIN: f64 = 60.0;
+/// Mean square of what is left in a line's band, in units of noise, from which on it may beat.
+const BEATS: f64 = 3.0;
+/// Trials of a sum of exponentials, and how far above a mode that leaves no more than noise it may be for more of them.
+const EXPONENTIALS: (usize, f64) = (12, 300.0);
+
+/// A fit of all lines under test.
+pub(crate) struct Search<'a> {
+    pub(crate) problem: Weighted<'a>,
+    pub(crate) lines: &'a [Line],
+    pub(crate) carriers: &'a [f64],
+    pub(crate) options: &'a Options,
+    pub(crate) rules: Rules,
+}
+
+/// How a line is followed, and the numbers of its modes in the fit.
+pub(crate) struct OfLine {
+    pub(crate) modes: Vec<usize>,
+    pub(crate) bic_difference: Option<f64>,
+    /// Whether the first is one mode that the others are beside.
+    pub(crate) beside: bool,
+    /// Line and multiple that it is.
+    pub(crate) multiple: Option<(usize, usize)>,
+}
+
+impl OfLine {
+    /// Of its modes: more than one are a mode and what is beside.
+    pub(crate) fn of(modes: Vec<usize>) -> Self {
+        let beside = modes.len() > 1;
+        Self { modes, bic_difference: None, beside, multiple: None }
+    }
+}
+
+impl Search<'_> {
+    pub(crate) fn bic(&self, fit: &Fit) -> f64 {
+        let rows: usize = self.problem.data.records.iter().map(|r| r.rows).sum();
+        let terms: usize = fit.modes.iter().map(|m| m.damping.terms.len() + m.frequency.terms.len() - 2).sum();
+        // one of so many terms: each has its share of the prior
+        let choice = 2.0 * (2.0 * (TERMS - 1) as f64).ln() * terms as f64;
+        fit.normal.chi_square + fit.parameters() as f64 * (rows.max(2) as f64).ln() + choice
+    }
+
+    fn lack(&self, fit: &Fit, mode: usize) -> Lack {
+        lack(self.problem.data, fit, self.problem.weights, mode)
+    }
+
+    /// Budget of the choice of terms: little where a line beats that two exponentials explain, since no term mends a
+    /// beat.
+    pub(crate) fn for_terms(&self, begin: &Fit) -> f64 {
+        self.problem.budget.set(0.2 * BUDGET);
+        let beats = |line: usize| {
+            let wide = self.lack(begin, line).band > BEATS;
+            let pair = if wide { self.sum_of(begin, line, line, false) } else { None };
+            let fine = |fit: Fit| (begin.modes.len() - 1..fit.modes.len()).all(|n| self.lack(&fit, n).factor <= 1.0);
+            pair.is_some_and(fine)
+        };
+        if (0..self.lines.len()).any(beats) { 0.04 * BUDGET } else { 0.4 * BUDGET }
+    }
+
+    /// Lines that are multiples of the phase of another line's mode.
+    pub(crate) fn without_multiples(&self, start: Fit, of_lines: &mut [OfLine]) -> Fit {
+        let mut best = start;
+        for line in (0..of_lines.len()).filter(|_| self.options.harmonics) {
+            for of in 0..of_lines.len() {
+                let (Some(&number), Some(&base)) = (of_lines[line].modes.first(), of_lines[of].modes.first()) else {
+                    continue;
+                };
+                for (which, multiple) in MULTIPLES.iter().enumerate() {
+                    let (own, main) = (&best.modes[number], &best.modes[base]);
+                    let apart = (own.turn - *multiple as f64 * main.turn).abs();
+                    let near = apart < NEAR_MULTIPLE * own.turn + 3.0 * own.damping.coefficients[0].abs();
+                    if line == of || !near || main.harmonics[which].is_some() {
+                        continue;
+                    }
+                    let size = |m: &Mode| m.unit * m.starts.iter().map(|s| s.0.exp()).fold(0.0, f64::max);
+                    let weak = size(own) < WEAK * size(main);
+                    let mut modes = best.modes.clone();
+                    modes[base].multiples[which] = Some(own.carrier);
+                    modes[base].harmonics[which] = Some(vec![c64::default(); self.problem.data.channels]);
+                    modes.remove(number);
+                    let mut without = modes.clone();
+                    without[base - usize::from(base > number)].harmonics[which] = None;
+                    let Some(next) = fit(&self.problem, modes) else { continue };
+                    let Some(without) = fit(&self.problem, without) else { continue };
+                    let gain = |fit: &Fit| without.normal.chi_square - fit.normal.chi_square;
+                    if self.bic(&next) < self.bic(&best) || weak && gain(&next) > EXPLAINED * gain(&best) {
+                        let last = next.modes.len();
+                        take(of_lines, line, number, last, last);
+                        of_lines[line].multiple = Some((of, *multiple));
+                        best = next;
+                        break;
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Each line that moves, has companions or leaves more than noise, as sums of exponentials instead, or with a
+    /// linear mode beside.
+    pub(crate) fn alternatives(&self, start: Fit, of_lines: &mut [OfLine]) -> Fit {
+        let mut best = start;
+        for line in 0..of_lines.len() {
+            let &[number] = of_lines[line].modes.as_slice() else { continue };
+            let left = self.lack(&best, number);
+            let lacks = left.factor > 1.0;
+            if self.problem.is_spent() || !best.modes[number].moves() && self.lines[line].poles.len() < 2 && !lacks {
+                continue;
+            }
+            let own = self.bic(&best);
+            let mode = &best.modes[number];
+            let terms = mode.damping.terms.len() + mode.frequency.terms.len() - 2;
+            let plain = !lacks && terms <= PLAIN_TERMS;
+            let other = self.sum_of(&best, line, number, plain);
+            let beside = if left.p_value < UNEXPLAINED { self.beside(&best, line, number) } else { None };
+            of_lines[line].bic_difference = other.as_ref().map(|other| own - self.bic(other));
+            // as good is not enough where one mode is the plainer account, and enough where it is not
+            let wanted = own - if plain { DECISIVE } else { -DECISIVE * f64::from(u8::from(!lacks)) };
+            let good = |fit: &Fit| self.bic(fit) < wanted;
+            let beside = beside.filter(|fit| self.bic(fit) < own - BESIDE_GAIN);
+            let other = other.filter(good);
+            let sum_is_better = match (&other, &beside) {
+                (Some(a), Some(b)) => self.bic(a) <= self.bic(b) + DECISIVE,
+                (one, _) => one.is_some(),
+            };
+            if let (Some(other), true) = (&other, sum_is_better) {
+                take(of_lines, line, number, best.modes.len() - 1, other.modes.len());
+                best = other.clone();
+            } else if let Some(beside) = beside {
+                of_lines[line].modes.push(best.modes.len());
+                of_lines[line].beside = true;
+                best = beside;
+            }
+        }
+        best
+    }
+
+    /// The mode with a linear one in its line: steady, or with a pole of the linear fit.
+    fn beside(&self, best: &Fit, line: usize, number: usize) -> Option<Fit> {
+        let mode = &best.modes[number];
+        let longest = self.problem.data.hits.iter().map(|hit| hit.duration_s).fold(0.0, f64::max);
+        let low = mode.frequency.at(&values(0.05 * range(mode).1, mode.floor).value);
+        let given = self.lines[line].poles.iter().map(|p| (p.rate_per_s.max(0.0), p.turn_rad_per_s - mode.turn));
+        let with = |pole: Pole| {
+            if self.problem.is_spent() {
+                return None;
+            }
+            let unit = Mode {
+                damping: Law::constant(pole.0.max(LEAST_DECAY / longest)),
+                frequency: Law::constant(pole.1),
+                harmonics: [None, None],
+                may_move: false,
+                ..mode.clone()
+            };
+            let more = solved(self.problem.data, &best.modes, vec![unit])?;
+            let begin = fit(&self.problem, best.modes.iter().cloned().chain(more).collect())?;
+            Some(selected(&self.problem, begin, &self.rules, 3))
+        };
+        let starts = std::iter::once((0.0, low)).chain(given);
+        starts.take(3).filter_map(with).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
+    }
+
+    /// The best sum of exponentials in place of a mode. Where the mode leaves noise alone with few terms (`plain`),
+    /// few trials.
+    fn sum_of(&self, best: &Fit, line: usize, number: usize, plain: bool) -> Option<Fit> {
+        let mode = &best.modes[number];
+        let others: Vec<Mode> =
+            best.modes.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, m)| m.clone()).collect();
+        let trials = if plain { EXPONENTIALS.0 } else { TRIALS };
+        let mut other: Option<Fit> = None;
+        for count in 2..=self.options.most_exponentials {
+            let starts = self.starts(line, mode, count, other.as_ref(), others.len());
+            let Some(next) = exponentials(&self.problem, &others, mode, &starts, trials) else { continue };
+            let far = plain && next.normal.chi_square > best.normal.chi_square + EXPONENTIALS.1;
+            let better = other.as_ref().is_none_or(|o| self.bic(&next) < self.bic(o));
+            if better {
+                other = Some(self.with_fewer(next, &others, mode, count));
+            }
+            if far || !better || self.problem.is_spent() {
+                break;
+            }
+        }
+        other
+    }
+
+    /// The same with one exponential less where that is as good: fewer may not have arrived from their own starts.
+    fn with_fewer(&self, fit: Fit, others: &[Mode], mode: &Mode, count: usize) -> Fit {
+        if count < 3 || self.problem.is_spent() {
+            return fit;
+        }
+        let poles: Vec<Pole> = fit.modes[others.len()..]
+            .iter()
+            .map(|m| (m.damping.coefficients[0], m.frequency.coefficients[0]))
+            .collect();
+        let without = |j: usize| poles.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, p)| *p).collect();
+        let starts: Vec<Vec<Pole>> = (0..count).map(without).collect();
+        match exponentials(&self.problem, others, mode, &starts, TRIALS) {
+            Some(fewer) if self.bic(&fewer) < self.bic(&fit) => fewer,
+            _ => fit,
+        }
+    }
+
+    pub(crate) fn follows(&self, found: &Fit, of: &OfLine) -> (Follows, Lack) {
+        let lacks = of.modes.iter().map(|n| self.lack(found, *n));
+        let none = Lack { factor: 1.0, p_value: 1.0, along: 1.0, band: 1.0 };
+        let worst = lacks.max_by(|a, b| a.factor.total_cmp(&b.factor)).unwrap_or(none);
+        if let Some((of, multiple)) = of.multiple {
+            return (Follows::Multiple { of, multiple }, none);
+        }
+        let follows = match of.modes.len() {
+            _ if worst.p_value < UNEXPLAINED && worst.factor > 2.0 => Follows::None,
+            _ if of.beside => Follows::Beside,
+            1 if found.modes[of.modes[0]].moves() => Follows::Moving,
+            1 => Follows::Linear,
+            count => Follows::Exponentials(count),
+        };
+        (follows, worst)
+    }
+
+    /// Starts of so many exponentials: those of the linear fit; the mode's poles at its largest and smallest amplitude;
+    /// pairs about it.
+    fn starts(&self, line: usize, mode: &Mode, count: usize, fewer: Option<&Fit>, others: usize) -> Vec<Vec<Pole>> {
+        let carrier = self.carriers[line];
+        let mut given: Vec<Pole> =
+            self.lines[line].poles.iter().map(|p| (p.rate_per_s, p.turn_rad_per_s - carrier)).collect();
+        given.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut starts = Vec::new();
+        if given.len() == count {
+            starts.push(given);
+        }
+        let high = range(mode).1;
+        let pole = |a: f64| {
+            let v = values(a, mode.floor).value;
+            (mode.damping.at(&v).max(1e-6 * carrier), mode.frequency.at(&v))
+        };
+        let (early, late) = (pole(high), pole(0.2 * high));
+        let mean = (0.5 * (early.0 + late.0)).max(1e-6 * carrier);
+        if count == 2 {
+            starts.push(vec![late, (2.0 * early.0.max(late.0), early.1)]);
+            if let Some(main) = self.lines[line].main() {
+                let (rate, centre) = (main.rate_per_s.max(1e-6 * carrier), main.turn_rad_per_s - carrier);
+                starts.push(vec![(rate, centre - 1.2 * rate), (rate, centre + 1.2 * rate)]);
+            }
+            for apart in [0.7, 2.5] {
+                starts.push(vec![(mean, late.1 - apart * mean), (mean, late.1 + apart * mean)]);
+            }
+        } else if let Some(fewer) = fewer {
+            let known: Vec<Pole> = fewer.modes[others..]
+                .iter()
+                .map(|m| (m.damping.coefficients[0], m.frequency.coefficients[0]))
+                .collect();
+            let fastest = known.iter().map(|p| p.0).fold(0.0, f64::max);
+            let centre = known.iter().map(|p| p.1).sum::<f64>() / known.len().max(1) as f64;
+            starts.push(known.iter().copied().chain([(2.0 * fastest, centre)]).collect());
+            starts.push(known.iter().copied().chain([(mean, centre)]).collect());
+        }
+        starts
+    }
+}
+
+/// Replaces a line's mode by exponentials, which are the last modes of the fit.
+fn take(of_lines: &mut [OfLine], line: usize, number: usize, from: usize, to: usize) {
+    // modes behind the removed one move up
+    for of in of_lines.iter_mut() {
+        of.modes.iter_mut().filter(|n| **n > number).for_each(|n| *n -= 1);
+    }
+    of_lines[line].modes = (from..to).collect();
+}
