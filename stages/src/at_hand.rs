@@ -7,7 +7,8 @@ use afmid_pipeline::{Array, Channel, Recording, StageError};
 
 pub use crate::artifacts::Sensor as Named;
 use crate::artifacts::decay_array;
-use crate::io::{MemorySource, columns_at_hand, memory_record};
+pub use crate::io::columns::pair_of_series as pair;
+use crate::io::{MemorySource, memory_record};
 
 /// What `io.records` hands on: records of as many samples in each of these channels. Errors: a record with another
 /// number of channels than names.
@@ -41,18 +42,6 @@ pub fn recording(
 pub fn decays(hits: &[Vec<Vec<f64>>], channels: &[Named], sample_rate_hz: f64) -> Result<Array, StageError> {
     hits.iter().try_for_each(|hit| as_many(hit.len(), channels))?;
     decay_array(hits, &[], channels, sample_rate_hz)
-}
-
-/// What `io.columns` hands on for these inputs and outputs with these parameters of its own (`remove`, ...), and what it
-/// warns of. Errors: as that stage.
-pub fn pair(
-    inputs: Vec<Vec<f64>>,
-    outputs: Vec<Vec<f64>>,
-    names: [&[Named]; 2],
-    sample_rate_hz: f64,
-    params: serde_json::Value,
-) -> Result<(Array, Vec<String>), StageError> {
-    columns_at_hand(inputs, outputs, names, sample_rate_hz, params)
 }
 
 fn as_many(found: usize, channels: &[Named]) -> Result<(), StageError> {

@@ -15,13 +15,15 @@ export PYTHONDONTWRITEBYTECODE=1
 for tool in cc gcc cargo rustc; do
     if command -v "$tool"; then echo "$tool is still there"; exit 1; fi
 done
-python -m pip install --quiet --disable-pip-version-check "$wheel[plot,scipy,control]"
+# versions of the other readers: the same every day, and loaded once
+pins=(-c "$root/tests/requirements.txt")
+python -m pip install --quiet --disable-pip-version-check "${pins[@]}" "$wheel[plot,scipy,control]"
 echo "== the first lines of the README"
 python "$root/tests/wheel/readme_lines.py" "$root/python/afmid/README.md" ringdown pem read >lines.py
 python lines.py
 afmid --version
 echo "== tests and examples"
-python -m pip install --quiet --disable-pip-version-check pytest
+python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest
 python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
 examples=(afmid.arrays_at_hand afmid.decays afmid.diagnoses afmid.identification afmid.numbers afmid.reading afmid.running)
 python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

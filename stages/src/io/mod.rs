@@ -24,7 +24,6 @@ pub use crate::artifacts::quantity_of_unit;
 pub use census::Census;
 pub use code_census::{CensusSettings, ChannelCensus, Found};
 pub use columns::Columns;
-pub(crate) use columns::columns_at_hand;
 pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::{Match, matching_files};
 pub(crate) use frf::FRF;

@@ -13,8 +13,7 @@ def main() -> None:
     """
     from . import _native
 
-    for number in (signal.SIGINT, signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else (signal.SIGINT,):
-        # what was ignored when the process began (nohup) stays ignored; Python itself ignores SIGPIPE, as Rust does
-        if number != getattr(signal, "SIGPIPE", None) and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
+    # what was ignored when the process began (nohup) stays ignored; SIGPIPE is ignored by Python as by Rust
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(_native.main(len(sys.argv) - 1))

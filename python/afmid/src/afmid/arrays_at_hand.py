@@ -37,14 +37,14 @@ def real(values: Any, what: str) -> Array:
     return np.ascontiguousarray(found, dtype=np.float64)
 
 
-def records(y: Any, axes: str | None) -> tuple[list[list[Array]], str]:
-    """Records of channels of samples, and what the axes were taken for.
+def records(y: Any, axes: str | None) -> list[list[Array]]:
+    """Records of channels of samples.
 
-    >>> [len(record) for record in records(np.zeros((3, 100)), "hits")[0]]
+    >>> [len(record) for record in records(np.zeros((3, 100)), "hits")]
     [1, 1, 1]
-    >>> [len(record) for record in records(np.zeros((3, 100)), "channels")[0]]
+    >>> [len(record) for record in records(np.zeros((3, 100)), "channels")]
     [3]
-    >>> len(records(np.zeros((5, 3, 100)), None)[0])
+    >>> len(records(np.zeros((5, 3, 100)), None))
     5
     """
     if isinstance(y, (list, tuple)) and y and all(np.ndim(part) > 0 for part in y):
@@ -53,7 +53,7 @@ def records(y: Any, axes: str | None) -> tuple[list[list[Array]], str]:
             return _unequal(y, axes)
     found = real(y, "y")
     if found.ndim == 1:
-        return [[found]], "samples"
+        return [[found]]
     if found.ndim == 2:
         if axes not in (None, "hits", "channels"):
             raise DataError(f'axes is {axes!r}, wanted "hits" or "channels": what the first axis of y counts')
@@ -67,20 +67,20 @@ def records(y: Any, axes: str | None) -> tuple[list[list[Array]], str]:
                 f"y has the shape {found.shape}: {found.shape[0]} rows of {found.shape[1]} samples", help="is y.T meant?"
             )
         rows = list(found)
-        return ([[row] for row in rows], "hits, samples") if axes == "hits" else ([rows], "channels, samples")
+        return [[row] for row in rows] if axes == "hits" else [rows]
     if found.ndim == 3:
-        return [list(hit) for hit in found], "hits, channels, samples"
+        return [list(hit) for hit in found]
     raise DataError(f"y has {found.ndim} axes, wanted samples; hits or channels, samples; or hits, channels, samples")
 
 
-def _unequal(y: Sequence[Any], axes: str | None) -> tuple[list[list[Array]], str]:
+def _unequal(y: Sequence[Any], axes: str | None) -> list[list[Array]]:
     """Hits of unlike length."""
     if axes == "channels":
         raise DataError("the channels in y have unlike lengths, wanted one")
     parts = [real(part, f"y[{k}]") for k, part in enumerate(y)]
     if any(part.ndim > 2 for part in parts):
         raise DataError("the hits in y want one or two axes: samples; channels, samples")
-    return [[part] if part.ndim == 1 else list(part) for part in parts], "hits, samples"
+    return [[part] if part.ndim == 1 else list(part) for part in parts]
 
 
 def names(channels: Sequence[str] | None, units: str | Sequence[str] | None, count: int, what: str) -> list[Any]:

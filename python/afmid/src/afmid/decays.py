@@ -12,12 +12,10 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import names, rate, records
 from .errors import DataError
-from .numbers import html_table, text_table, with_error
+from .numbers import MODE_HEADS, html_table, mode_rows, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,29 +47,40 @@ class Ringdown:
         numbers = range(1, found.shape[0] + 1)
         return pd.DataFrame(found.values, index=pd.Index(numbers, name="mode"), columns=list(numbers))
 
-    def _rows(self) -> list[list[str]]:
-        rows = []
-        for number, mode in enumerate(self.modes.itertuples(), 1):
-            damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
-            quality = with_error(mode.quality_factor, mode.quality_factor_std)
-            rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
-        return rows
-
     def summary(self) -> str:
         """The table of modes with standard errors in brackets, and what is not alright, as text."""
-        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
+        return "\n".join([text_table(MODE_HEADS, mode_rows(self.modes)), *(f"warning: {text}" for text in self.warnings)])
 
     def __repr__(self) -> str:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        return html_table(HEADS, self._rows(), self.warnings)
+        return html_table(MODE_HEADS, mode_rows(self.modes), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Measured, fitted and what is left of the largest hit, a row of axes per channel. Needs matplotlib."""
         from .figures import decay
 
         return decay(self.residuals, figure)
+
+
+def free_decays(
+    y: Any,
+    rate_hz: float,
+    axes: str | None,
+    begin: str | int,
+    channels: Sequence[str] | None,
+    units: str | Sequence[str] | None,
+) -> tuple[Any, pd.DataFrame | None, list[str]]:
+    """The decays in records, where they were found, and what is to be said of them; `begin`: see `ringdown`."""
+    found = records(y, axes)
+    named = names(channels, units, len(found[0]), "channel")
+    if begin == "auto":
+        searched, said = artifacts.run_stage("events.decay", {"records": _native.recording(found, named, rate_hz)})
+        return searched["decays"], artifacts.table(searched["events"]), said
+    if begin == 0:
+        return _native.decays(found, named, rate_hz), None, []
+    raise DataError(f'begin is {begin!r}, wanted "auto" or 0')
 
 
 def ringdown(
@@ -146,19 +155,7 @@ def ringdown(
     >>> bool(abs(mode.frequency_hz - 250.04) < 0.01), bool(abs(mode.quality_factor - 65.5) < 0.2)
     (True, True)
     """
-    found, _ = records(y, axes)
-    rate_hz = rate(sample_rate_hz)
-    named = names(channels, units, len(found[0]), "channel")
-    said: list[str] = []
-    events = None
-    if begin == "auto":
-        recording = _native.recording(found, named, rate_hz)
-        searched, said = artifacts.run_stage("events.decay", {"records": recording})
-        decays, events = searched["decays"], artifacts.table(searched["events"])
-    elif begin == 0:
-        decays = _native.decays(found, named, rate_hz)
-    else:
-        raise DataError(f'begin is {begin!r}, wanted "auto" or 0')
+    decays, events, said = free_decays(y, rate(sample_rate_hz), axes, begin, channels, units)
     fitted, more = artifacts.run_stage(
         "model.decay",
         {"decays": decays},

@@ -12,8 +12,8 @@ import pandas as pd
 import xarray as xr
 
 from . import _native, artifacts
-from .arrays_at_hand import names, rate, real, records
-from .errors import DataError
+from .arrays_at_hand import names, rate, real
+from .decays import free_decays
 from .numbers import html_table, text_table, with_error
 
 HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
@@ -130,18 +130,9 @@ def diagnose(
     'clean'
     """
     rate_hz = rate(sample_rate_hz)
-    said: list[str] = []
     inputs: dict[str, Any] = {}
     if u is None:
-        found, _ = records(y, axes)
-        named = names(None, output_unit, len(found[0]), "channel")
-        if begin == "auto":
-            searched, said = artifacts.run_stage("events.decay", {"records": _native.recording(found, named, rate_hz)})
-            inputs["decays"] = searched["decays"]
-        elif begin == 0:
-            inputs["decays"] = _native.decays(found, named, rate_hz)
-        else:
-            raise DataError(f'begin is {begin!r}, wanted "auto" or 0')
+        inputs["decays"], _, said = free_decays(y, rate_hz, axes, begin, None, output_unit)
     else:
         inputs_given = np.atleast_2d(real(u, "u"))
         inputs["pair"], said = _native.pair(

@@ -15,12 +15,10 @@ from . import _native, artifacts
 from .arrays_at_hand import names, rate, real
 from .errors import DataError
 from .model import Model
-from .numbers import html_table, text_table, with_error
+from .numbers import MODE_HEADS, html_table, mode_rows, text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,26 +36,18 @@ class IdentifiedModel(Model):
     details: dict[str, Any] = field(default_factory=dict)
     """Convergence, orders that were tried, fits of the data, tests of the residual."""
 
-    def _rows(self) -> list[list[str]]:
-        rows = []
-        for number, mode in enumerate(self.modes.itertuples(), 1):
-            damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
-            quality = with_error(mode.quality_factor, mode.quality_factor_std)
-            rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
-        return rows
-
     def summary(self) -> str:
         """Order, fit and the table of modes with standard errors in brackets, and what is not alright, as text."""
         fit = self.details.get("simulation_fit_percent")
         head = f"order {self.order}" + (f", simulation fits {fit:.2f} % of the data" if fit is not None else "")
-        table = text_table(HEADS, self._rows()) if len(self.modes) else "no modes: nothing oscillates"
+        table = text_table(MODE_HEADS, mode_rows(self.modes)) if len(self.modes) else "no modes: nothing oscillates"
         return "\n".join([head, table, *(f"warning: {text}" for text in self.warnings)])
 
     def __repr__(self) -> str:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        return f"<p>order {self.order}</p>" + html_table(HEADS, self._rows(), self.warnings)
+        return f"<p>order {self.order}</p>" + html_table(MODE_HEADS, mode_rows(self.modes), self.warnings)
 
     def bode(self, frequency_hz: Any = None, figure: Figure | None = None) -> Figure:
         """Magnitude and phase with their 95 % bands, from the first input. Needs matplotlib."""

@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def with_error(value: float, std: float) -> str:
@@ -25,6 +29,19 @@ def with_error(value: float, std: float) -> str:
         return f"{value:.9g} +- {std:.1e}"
     error = round(std * 10**digits)
     return f"{value:.{digits}f}({error})"
+
+
+MODE_HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
+
+
+def mode_rows(modes: pd.DataFrame) -> list[list[str]]:
+    """A table of modes as text, under `MODE_HEADS`."""
+    rows = []
+    for number, mode in enumerate(modes.itertuples(), 1):
+        damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
+        quality = with_error(mode.quality_factor, mode.quality_factor_std)
+        rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
+    return rows
 
 
 def text_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

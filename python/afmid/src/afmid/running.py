@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,11 +41,11 @@ def run(
     set : mapping, optional
         Other values of parameters: `{"model.order": 9}`.
     output : path, optional
-        Where the result is written; a temporary file where it is not said.
+        Where the result is written. Where it is not said, a temporary file that lives as long as the result.
     cache : path, optional
         The folder of the cache; the program's own by default.
     progress : bool
-        Whether the program's progress and warnings are shown.
+        Whether what the program says is shown while it runs.
 
     Returns
     -------
@@ -65,7 +66,9 @@ def run(
     Traceback (most recent call last):
     afmid.errors.ConfigError: ...io.column...
     """
-    place = Path(output) if output is not None else Path(tempfile.mkdtemp(prefix="afmid-")) / "result.h5"
+    # a result that nobody named lives as long as its reader
+    kept = tempfile.TemporaryDirectory(prefix="afmid-") if output is None else None
+    place = Path(kept.name) / "result.h5" if kept is not None else Path(os.fspath(output or ""))
     values = dict(set or {})
     if files is not None:
         values[f"{_loading_stage(Path(config))}.files"] = [os.path.abspath(file) for file in files]
@@ -74,13 +77,19 @@ def run(
         command += ["--set", f"{name}={json.dumps(value)}"]
     if cache is not None:
         command += ["--cache", os.fspath(cache)]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
-    if progress and done.stderr:
-        print(done.stderr, end="", file=sys.stderr)
-    if done.returncode != 0:
-        kind = ConfigError if done.returncode == _USAGE else DataError
-        raise kind(done.stderr.strip() or f"afmid run ended with {done.returncode}")
-    return open_result(place)
+    said = []
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as running:
+        for line in running.stderr or ():
+            said.append(line)
+            if progress:
+                print(line, end="", file=sys.stderr, flush=True)
+    if running.returncode != 0:
+        kind = ConfigError if running.returncode == _USAGE else DataError
+        raise kind("".join(said).strip() or f"afmid run ended with {running.returncode}")
+    result = open_result(place)
+    if kept is not None:
+        weakref.finalize(result, kept.cleanup)
+    return result
 
 
 def _loading_stage(config: Path) -> str:

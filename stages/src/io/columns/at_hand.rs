@@ -8,9 +8,9 @@ use super::series::Series;
 use super::stage::Columns;
 use crate::artifacts::Sensor as Named;
 
-/// The pair that the stage hands on of these series with these parameters, and what it warns of. Errors: a parameter
-/// that is none; as the stage.
-pub(crate) fn columns_at_hand(
+/// What the stage hands on of these inputs and outputs with these of its parameters (`remove`, ...), and what it warns
+/// of. Errors: a parameter that is none; as the stage.
+pub fn pair_of_series(
     inputs: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
     names: [&[Named]; 2],
