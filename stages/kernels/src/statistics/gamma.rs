@@ -17,6 +17,21 @@ pub fn chi_square_tail(value: f64, degrees: usize) -> f64 {
     gamma_tail(0.5 * degrees as f64, 0.5 * value)
 }
 
+/// Value that a chi-square variable exceeds with that probability. Bisection of [`chi_square_tail`], to rounding.
+pub fn chi_square_level(probability: f64, degrees: usize) -> f64 {
+    // at ten times the degrees and 1500 the tail is below the least number
+    let (mut low, mut high) = (0.0, 10.0 * degrees as f64 + 1500.0);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if chi_square_tail(middle, degrees) > probability {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
 /// Probability that a gamma variable of shape `a >= 0.5` and scale one exceeds `x`: the mean of `K` periodograms over
 /// its expectation is one of shape `K`, divided by `K`.
 ///
@@ -106,6 +121,14 @@ mod tests {
             let doubled =
                 (2.0 * z - 1.0) * 2.0_f64.ln() + ln_gamma(z) + ln_gamma(z + 0.5) - 0.5 * std::f64::consts::PI.ln();
             assert!((ln_gamma(2.0 * z) - doubled).abs() < 1e-13 * doubled.abs().max(1.0), "{z}");
+        }
+    }
+
+    #[test]
+    fn a_level_is_exceeded_with_its_probability() {
+        // scipy.stats.chi2.isf
+        for (probability, degrees, value) in [(1e-3, 1, 10.827_566_170_662_733), (1e-3, 100, 149.449_252_779_038_9)] {
+            assert!((chi_square_level(probability, degrees) / value - 1.0).abs() < 1e-9, "{degrees}");
         }
     }
 

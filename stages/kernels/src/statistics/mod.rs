@@ -19,7 +19,7 @@ mod median;
 mod share;
 
 pub use beta::{binomial_tail, f_tail, incomplete_beta, student_limit, student_two_sided};
-pub use gamma::{chi_square_tail, gamma_tail, ln_gamma, normal_two_sided};
+pub use gamma::{chi_square_level, chi_square_tail, gamma_tail, ln_gamma, normal_two_sided};
 pub use half_sample_mode::half_sample_mode;
 pub use median::{median, median_and_scale};
 pub use share::clopper_pearson;

@@ -1,4 +1,5 @@
-//! Small dense symmetric matrices: Cholesky solution and inverse. In afmid: `linear_algebra`.
+//! Small symmetric matrices by the thousand: normal equations that are damped, solved and inverted without memory of
+//! their own for each step.
 
 /// A square matrix, row by row.
 #[derive(Debug, Clone, PartialEq)]

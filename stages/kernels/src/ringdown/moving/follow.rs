@@ -2,9 +2,9 @@
 
 use std::cell::Cell;
 
+use crate::model::ModelError;
 use crate::ringdown::moving::alternatives::{OfLine, Search};
 use crate::ringdown::moving::blocks::{Compressed, compress};
-use crate::ringdown::moving::error::MovingError;
 use crate::ringdown::moving::group::joined;
 use crate::ringdown::moving::input::check;
 use crate::ringdown::moving::layout::{first_half_block, half_block, noise, recentred};
@@ -66,7 +66,7 @@ const PLATEAU_GAIN: f64 = 20.0;
 /// Fits free decays with modes whose frequency and decay rate are functions of their amplitude.
 ///
 /// # Model
-/// README.md, (1) and (2): one mode with two laws per line, or several linear modes, whichever has the lower BIC.
+/// That of [`moving`](super): one mode with two laws per line, or several linear modes, whichever has the lower BIC.
 /// # Method
 /// Records compressed to slow envelopes in blocks; laws started from log amplitude and phase; all parameters by
 /// Levenberg-Marquardt; terms by forward selection, exchange and backward elimination; values averaged over models.
@@ -76,7 +76,8 @@ const PLATEAU_GAIN: f64 = 20.0;
 /// # Units
 /// Seconds, rad/s, 1/s; amplitudes in the unit of the reference channel.
 /// # Accuracy
-/// README.md, "Measured": errors cover at noise of 0.3 % of the amplitude; not with a steady line in the band.
+/// docs/results/decay.md, "Modes that move": errors cover at noise of 0.3 % of the amplitude; not with a steady line in
+/// the band.
 /// # Errors
 /// No hit, channel or line; unequal channels or samples; fewer than 16 samples; poles that are not finite or beyond the
 /// Nyquist frequency; records that do not determine the modes.
@@ -88,12 +89,12 @@ pub fn follow_moving(
     interval_s: f64,
     lines: &[Line],
     options: &Options,
-) -> Result<Moving, MovingError> {
+) -> Result<Moving, ModelError> {
     check(events, interval_s, lines, options)?;
     let rules = Rules { false_alarm: options.false_alarm };
-    let (joined, given): (Vec<Line>, Vec<Vec<usize>>) = joined(lines).into_iter().unzip();
-    let lines = joined.as_slice();
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(1) as f64 * interval_s;
+    let (joined, given): (Vec<Line>, Vec<Vec<usize>>) = joined(lines, longest).into_iter().unzip();
+    let lines = joined.as_slice();
     let decaying = |p: Exponential| Exponential { rate_per_s: p.rate_per_s.max(LEAST_DECAY / longest), ..p };
     let mains: Vec<Exponential> = lines.iter().filter_map(Line::main).map(decaying).collect();
     let turns: Vec<f64> = mains.iter().map(|p| p.turn_rad_per_s).collect();
@@ -101,7 +102,7 @@ pub fn follow_moving(
     let first = compress(events, interval_s, &turns, first_half);
     let variances = noise(&first, events, options);
     let rates: Vec<f64> = mains.iter().map(|p| p.rate_per_s).collect();
-    let none = MovingError::Degenerate("the records do not determine the modes");
+    let none = ModelError::Degenerate("the records do not determine the modes");
     let mut modes = starts(&first, &rates, &variances, &rules, &Cell::new(0.2 * BUDGET)).ok_or(none.clone())?;
     let carriers = recentred(&mut modes, &turns);
     let job = Job { events, interval_s, lines, rates: &rates, carriers: &carriers, options, rules };
@@ -139,8 +140,8 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Passes with ever finer blocks, until they resolve what is found; then multiples, and the result.
-    fn fitted(&self, modes: Vec<Mode>, variances: &[f64]) -> Result<Moving, MovingError> {
-        let none = MovingError::Degenerate("the records do not determine the modes");
+    fn fitted(&self, modes: Vec<Mode>, variances: &[f64]) -> Result<Moving, ModelError> {
+        let none = ModelError::Degenerate("the records do not determine the modes");
         let budget = Cell::new(0.0);
         let (mut half, mut variances) = (0.0, variances.to_vec());
         let mut last: Option<(Compressed, Fit, Vec<OfLine>)> = None;

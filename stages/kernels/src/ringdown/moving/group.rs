@@ -1,9 +1,11 @@
 //! Which given lines are one: poles that a linear fit needs for a mode that moves lie within its width.
 
+use std::f64::consts::TAU;
+
 use crate::ringdown::moving::follow::{Exponential, Line};
 
 /// Distance of two frequencies, in the sum of the half widths, up to which lines are looked at as one: two linear modes
-/// there interfere, and a mode that moves by its width needs several poles.
+/// there interfere, and a mode that moves by its width needs several poles. So are those that the records do not resolve.
 const ONE_LINE: f64 = 2.5;
 
 impl Line {
@@ -13,10 +15,14 @@ impl Line {
     }
 }
 
-/// Lines joined, each with the numbers of those that it is made of.
-pub fn joined(lines: &[Line]) -> Vec<(Line, Vec<usize>)> {
+/// Lines joined, each with the numbers of those that it is made of; `longest_s`: the longest record.
+pub fn joined(lines: &[Line], longest_s: f64) -> Vec<(Line, Vec<usize>)> {
+    let resolution = TAU / longest_s;
     let near = |i: &usize, j: usize| match (lines[*i].main(), lines[j].main()) {
-        (Some(a), Some(b)) => (a.turn_rad_per_s - b.turn_rad_per_s).abs() < ONE_LINE * (a.rate_per_s + b.rate_per_s),
+        (Some(a), Some(b)) => {
+            let apart = (a.turn_rad_per_s - b.turn_rad_per_s).abs();
+            apart < (ONE_LINE * (a.rate_per_s + b.rate_per_s)).max(resolution)
+        }
         _ => false,
     };
     let mut groups: Vec<Vec<usize>> = Vec::new();

@@ -4,7 +4,7 @@ use crate::ringdown::moving::blocks::{COLUMNS, Compressed, Pattern};
 use crate::ringdown::moving::model::{Mode, Probe, normal, paths, rows_of};
 use crate::ringdown::moving::search::Fit;
 use crate::ringdown::moving::select::scored;
-use crate::ringdown::moving::statistics::chi_square_tail;
+use crate::statistics::chi_square_tail;
 
 /// Polynomials of the score test.
 const POLYNOMIALS: usize = 5;
@@ -28,9 +28,11 @@ pub struct Lack {
 /// and the energy in the span of the line's carrier.
 pub fn lack(data: &Compressed, fit: &Fit, weights: &[f64], mode: usize) -> Lack {
     let (gain, degrees) = smooth(data, fit, weights, mode).unwrap_or((0.0, 1));
-    let (energy, rows) = band(data, fit, weights, fit.modes[mode].carrier).unwrap_or((0.0, 0.0));
-    let (along, wide) = (gain / degrees as f64, if rows > 0.0 { energy / rows } else { 1.0 });
-    let (p_along, p_wide) = (chi_square_tail(gain, degrees as f64), chi_square_tail(energy, rows));
+    let (energy, rows) = band(data, fit, weights, fit.modes[mode].carrier).unwrap_or((0.0, 0));
+    let (along, wide) = (gain / degrees as f64, if rows > 0 { energy / rows as f64 } else { 1.0 });
+    // of a gain that is no number nothing is known
+    let p_along = chi_square_tail(gain.max(0.0), degrees);
+    let p_wide = if rows > 0 { chi_square_tail(energy, rows) } else { 1.0 };
     let by_along = if p_along < LEVEL { along.max(1.0) } else { 1.0 };
     let by_band = if p_wide < LEVEL { 1.0 + (wide - 1.0).max(0.0) * data.records.len() as f64 } else { 1.0 };
     Lack { factor: by_along.max(by_band), p_value: p_along.min(p_wide), along, band: wide }
@@ -54,10 +56,10 @@ fn smooth(data: &Compressed, fit: &Fit, weights: &[f64], mode: usize) -> Option<
 }
 
 /// Weighted energy of what is left in the span of a carrier's columns, and its degrees of freedom.
-fn band(data: &Compressed, fit: &Fit, weights: &[f64], carrier: usize) -> Option<(f64, f64)> {
+fn band(data: &Compressed, fit: &Fit, weights: &[f64], carrier: usize) -> Option<(f64, usize)> {
     let paths = paths(data, &fit.modes)?;
     let bases: Vec<Vec<Vec<f64>>> = data.patterns.iter().map(|p| basis(p, carrier)).collect();
-    let (mut energy, mut degrees) = (0.0, 0.0);
+    let (mut energy, mut columns) = (0.0, 0_usize);
     for record in &data.records {
         let left = rows_of(data, record, &fit.modes, &paths).left;
         let mut from = 0;
@@ -66,14 +68,14 @@ fn band(data: &Compressed, fit: &Fit, weights: &[f64], carrier: usize) -> Option
             for unit in &bases[block.pattern] {
                 let share: f64 = unit.iter().zip(&left[from..from + rows]).map(|(u, l)| u * l).sum();
                 energy += weights[record.channel] * share * share;
-                degrees += 1.0;
+                columns += 1;
             }
             from += rows;
         }
     }
     let used: usize = fit.modes.iter().filter(|m| m.carrier == carrier).map(Mode::count).sum();
-    let degrees = degrees - used as f64;
-    (degrees >= 2.0).then_some((energy, degrees))
+    let degrees = columns.checked_sub(used).filter(|degrees| *degrees >= 2)?;
+    Some((energy, degrees))
 }
 
 /// Orthonormal basis of a carrier's columns of R.

@@ -24,7 +24,8 @@
 //! # Accuracy
 //! docs/results/decay.md, "Modes that move". 20,000 samples of one mode take 10 to 60 ms.
 //! # Errors
-//! [`MovingError`]: unlike numbers, parameters out of range, records that determine nothing. No number is NaN.
+//! Unlike numbers of channels, samples or noise levels, too few samples, parameters out of range, records that determine
+//! nothing. No number of a result is NaN.
 //! # Source
 //! N. N. Bogoliubov, Y. A. Mitropolsky, Asymptotic Methods in the Theory of Non-Linear Oscillations (1961), chapter 1; G.
 //! Schwarz, Ann. Stat. 6 (1978) 461.
@@ -33,7 +34,6 @@ mod alternatives;
 mod average;
 mod blocks;
 mod dense;
-mod error;
 mod exponentials;
 mod follow;
 mod group;
@@ -48,12 +48,12 @@ mod search;
 mod select;
 mod signal;
 mod start;
-mod statistics;
 mod terms;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wild_tests;
 
-pub use error::MovingError;
 pub use follow::{Exponential, Line, Options, follow_moving};
 pub use lack::Lack;
 pub use result::{CoursePoint, FollowedLine, FollowedMode, Follows, Moving};

@@ -3,8 +3,8 @@
 use crate::ringdown::moving::dense::{Factor, Square};
 use crate::ringdown::moving::model::Mode;
 use crate::ringdown::moving::search::{Fit, Problem, TRIALS, fit_within};
-use crate::ringdown::moving::statistics::chi_square_level;
 use crate::ringdown::moving::terms::{ALL, Law, TERMS, Term, values};
+use crate::statistics::chi_square_level;
 
 /// When a term is kept.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ impl Rules {
     /// Gains of chi square above which a term is kept, ten terms being tried: the first of a mode, and further ones.
     pub fn least_gains(&self) -> Gains {
         let tried = (2 * (TERMS - 1)) as f64;
-        let level = |p: f64| chi_square_level(p.min(0.5) / tried, 1.0);
+        let level = |p: f64| chi_square_level(p.min(0.5) / tried, 1);
         Gains { first: level(self.false_alarm), further: level(FURTHER * self.false_alarm) }
     }
 }

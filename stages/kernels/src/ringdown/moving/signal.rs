@@ -7,7 +7,7 @@ use crate::ringdown::moving::follow::Options;
 use crate::ringdown::moving::model::{MULTIPLES, Mode, paths};
 use crate::ringdown::moving::path::path;
 use crate::ringdown::moving::search::Fit;
-use crate::ringdown::moving::statistics::chi_square_tail;
+use crate::statistics::chi_square_tail;
 use faer::c64;
 
 /// Share of the Nyquist frequency up to which multiples are modelled.
@@ -49,7 +49,7 @@ pub(crate) fn multiples(
                 }
             }
             let gain: f64 = sums.iter().zip(variances).map(|(s, v)| s.0.norm_sqr() / s.1.max(1e-300) / v).sum();
-            if chi_square_tail(gain, 2.0 * data.channels as f64) < 0.5 * options.false_alarm {
+            if chi_square_tail(gain, 2 * data.channels) < 0.5 * options.false_alarm {
                 out.push((number, which));
             }
         }

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{Exponential, Follows, Line, MovingError, Options, Term, follow_moving};
+use super::{Exponential, Follows, Line, Options, Term, follow_moving};
+use crate::model::ModelError;
 
 /// Deterministic noise of unit variance: sum of twelve uniform numbers.
 fn noise(state: &mut u64) -> f64 {
@@ -95,9 +96,9 @@ fn missing_samples_are_passed_over() {
 fn wrong_input_is_an_error() {
     let y = vec![0.0; 100];
     let wrong = |lines: &[Line]| follow_moving(&[vec![&y]], 1e-3, lines, &Options::default());
-    assert!(matches!(wrong(&[]), Err(MovingError::Length { what: "lines", .. })));
-    assert!(matches!(wrong(&[line(600.0, 1.0)]), Err(MovingError::Parameter { name: "poles", .. })));
+    assert!(matches!(wrong(&[]), Err(ModelError::Parameter { name: "lines", .. })));
+    assert!(matches!(wrong(&[line(600.0, 1.0)]), Err(ModelError::Parameter { name: "poles", .. })));
     let short = [0.0; 10];
     let found = follow_moving(&[vec![&short]], 1e-3, &[line(40.0, 1.0)], &Options::default());
-    assert!(matches!(found, Err(MovingError::Length { what: "samples", .. })));
+    assert!(matches!(found, Err(ModelError::TooShort { found: 10, wanted: 16 })));
 }
