@@ -1,4 +1,5 @@
-//! Free decays: the largest as measured and as fitted, and what moves from its first to its last part.
+//! Free decays: the largest as measured and as fitted, and what moves from its first to its last part or along its
+//! amplitude.
 
 use afmid_pipeline::{Array, Document, RunResult};
 use serde_json::Value;
@@ -7,12 +8,12 @@ use super::channel_axis;
 use crate::report::estimates::with_percent;
 use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke, slug};
 use crate::report::find::{Found, all, unit_of};
-use crate::report::number::quantity;
+use crate::report::number::{quantity, rounded};
 use crate::report::view::{Head, TableView};
 
 const USES: &str = "model.decay";
 
-/// A table for each fit: the modes from the first and from the last part alone.
+/// A table for each fit: the modes from the first and from the last part alone, or along their amplitude.
 pub(super) fn course(run: &RunResult) -> Vec<TableView> {
     all::<Document>(run).filter(|found| found.stage.uses == USES).filter_map(|found| parts(found.value)).collect()
 }
@@ -20,24 +21,34 @@ pub(super) fn course(run: &RunResult) -> Vec<TableView> {
 fn parts(document: &Document) -> Option<TableView> {
     let pairs = document.0.get("course")?.as_array()?;
     let mut heads = vec![Head::number("mode", ""), Head::text("part")];
-    heads.extend(["from", "to", "frequency", "damping ratio"].map(|name| Head::number(name, "")));
+    heads.extend(["from", "to", "amplitude", "frequency", "damping ratio"].map(|name| Head::number(name, "")));
     heads.push(Head::text("moves"));
     let caption = "The same modes from the first and the last part alone: a linear mode has one frequency and one \
-        damping ratio, whatever its amplitude.";
+        damping ratio, whatever its amplitude. One that follows laws of its amplitude stands at several of them.";
     let mut table = TableView::new(caption, heads);
-    for pair in pairs {
-        let moves = pair.get("moves").and_then(Value::as_bool) == Some(true);
-        for name in ["first", "last"] {
-            let end = pair.get(name)?;
-            let at = |name: &str| end.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    for mode in pairs {
+        let number = mode.get("mode").map(Value::to_string).unwrap_or_default();
+        let moves = match (mode.get("moves").and_then(Value::as_bool), mode.get("along")) {
+            (Some(true), Some(_)) => "with its amplitude",
+            (Some(true), None) => "yes: not linear",
+            _ => "no",
+        };
+        let along = mode.get("along").and_then(Value::as_array);
+        let points = match along {
+            Some(points) => points.iter().map(|point| ("", point)).collect(),
+            None => vec![("first", mode.get("first")?), ("last", mode.get("last")?)],
+        };
+        for (name, point) in points {
+            let at = |name: &str| point.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
             table.rows.push(vec![
-                pair.get("mode").map(Value::to_string).unwrap_or_default(),
+                number.clone(),
                 name.to_owned(),
-                quantity(at("from_s"), f64::NAN, "s"),
-                quantity(at("to_s"), f64::NAN, "s"),
+                if along.is_some() { rounded(at("from_s"), 4, "s") } else { quantity(at("from_s"), f64::NAN, "s") },
+                if along.is_some() { String::new() } else { quantity(at("to_s"), f64::NAN, "s") },
+                if along.is_some() { rounded(at("amplitude"), 4, "") } else { String::new() },
                 quantity(at("frequency_hz"), at("frequency_std_hz"), "Hz"),
                 with_percent(at("damping_ratio"), at("damping_ratio_std")),
-                if moves { "yes: not linear" } else { "no" }.to_owned(),
+                moves.to_owned(),
             ]);
         }
     }

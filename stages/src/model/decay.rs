@@ -1,5 +1,6 @@
 //! The stage `model.decay`.
 
+mod along;
 mod course;
 mod systems;
 mod tables;
@@ -15,7 +16,9 @@ use super::count::Count;
 use crate::artifacts::{Decays, shape_array};
 use crate::events::DECAYS;
 use crate::watched::watch;
-use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, follow_channels};
+use afmid_kernels::ringdown::{
+    ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, Motion, follow_channels,
+};
 
 /// Fits modes and mode shapes to free decays: one set of poles for all channels of all hits.
 ///
@@ -23,13 +26,15 @@ use afmid_kernels::ringdown::{ChannelNoise, ChannelOptions, ChannelRingdown, Dro
 /// its own, noise of each channel white with wander. Of several hits the residues of a mode are one complex shape over
 /// the channels times an amplitude per hit: tested, not imposed.
 /// Method: maximum likelihood by variable projection; modes one by one, each kept if noise alone gains as much with a
-/// probability below `false_alarm`. Exponentials that a mode leaves because it moves with its amplitude (in its line,
-/// of its shape, twice as fast) and lines that do not die away are left out. The first and the last part of the decays are
-/// fitted too and their difference is tested: where a mode moves and none has died away, the last part counts.
+/// probability below `false_alarm`. Lines that do not die away are left out. The first and the last part of the decays are
+/// fitted too and their difference is tested. A mode that moves is fitted as one whose frequency and damping are functions
+/// of its amplitude, of terms that the data choose (1, a, a^2, a^4, log a, 1/a), against as many exponentials as its line
+/// needs: where the laws hold it is one row with the values at the smallest amplitude reached; where no law holds, the
+/// last part counts.
 /// Of several hits each is fitted by itself first: hits without a mode in common are of unlike systems, and those of one
 /// of them (`system`) are fitted.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
-/// mode; `hits` a row per hit and mode; `course` a row per mode and part; `systems` a row per hit;
+/// mode; `hits` a row per hit and mode; `course` rows of each mode, from both parts or along its amplitude; `systems` a row per hit;
 /// `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
 /// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
@@ -50,7 +55,8 @@ pub struct DecayFit {
     /// 1. Why: hits of one structure are of one system, whatever it is hit with and where.
     #[schemars(range(min = 1))]
     pub system: usize,
-    /// What counts of a mode that moves far while it dies away: `auto`, its last part, or `whole`, all.
+    /// What counts of a mode that moves while it dies away: `auto`, its laws at the smallest amplitude or else its last
+    /// part, or `whole`, one linear mode for all.
     pub part: FittedPart,
     /// How it is fitted.
     #[serde(flatten)]
@@ -61,9 +67,9 @@ pub struct DecayFit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FittedPart {
-    /// The last part of those modes.
+    /// Laws of the amplitude, or else the last part of those modes.
     Auto,
-    /// All of each decay.
+    /// One linear mode for all of each decay.
     Whole,
 }
 
@@ -94,7 +100,8 @@ pub(super) const MODES: Port<Table> = Port::new("modes", "decay-modes", "modes, 
 pub(super) const SHAPES: Port<Array> =
     Port::new("shapes", "mode-shapes", "complex mode shapes over mode and channel, and how alike they are");
 const HITS: Port<Table> = Port::new("hits", "decay-hits", "amplitude of each mode in each hit");
-const COURSE: Port<Table> = Port::new("course", "decay-course", "modes of the first and the last part of the decays");
+const COURSE: Port<Table> =
+    Port::new("course", "decay-course", "modes of the first and the last part of the decays, or along their amplitude");
 pub(super) const SYSTEMS: Port<Table> =
     Port::new("systems", "decay-systems", "strongest mode of each hit by itself, and its system");
 const FIT: Port<Array> = Port::new("fit", "decay-fit", "the largest hit as measured, as fitted, and what is left");
@@ -105,7 +112,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 8,
+        version: 9,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
@@ -121,7 +128,8 @@ impl Stage for DecayFit {
         let decays = decays;
         let whole = self.part == FittedPart::Whole;
         let options = ChannelOptions { missing: decays.missing(), ..self.options(cx) };
-        let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, whole)
+        let motion = if whole { Motion::Whole } else { Motion::Laws };
+        let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, motion)
             .map_err(StageError::from_error)?;
         followed.fit.add_error_of_rate(decays.rate_relative_std);
         let parts = Parts::new(&followed, &decays);
@@ -142,7 +150,7 @@ impl Stage for DecayFit {
             .with(&HITS, hit_table(&followed.whole, &decays))
             .with(&COURSE, parts.table())
             .with(&SYSTEMS, systems.table())
-            .with(&FIT, fit_array(&followed.fitted, &decays))
+            .with(&FIT, fit_array(&followed, &decays))
             .with(&SUMMARY, summary(&followed, &parts, &systems, &decays)?))
     }
 
@@ -263,7 +271,7 @@ mod tests {
         let ring = |n: usize| (0..n).map(|k| (-0.02 * k as f64).exp() * (0.4 * k as f64).sin() + noise(k)).collect();
         let follows = |samples: usize| {
             let (long, short): (Vec<f64>, Vec<f64>) = (ring(200), ring(samples));
-            follow_channels(&[vec![&long[..]], vec![&short[..]]], &[], 1e-3, &ChannelOptions::default(), false)
+            follow_channels(&[vec![&long[..]], vec![&short[..]]], &[], 1e-3, &ChannelOptions::default(), Motion::Laws)
         };
         assert!(follows(LEAST_SAMPLES).is_ok() && follows(LEAST_SAMPLES - 1).is_err());
     }

@@ -37,7 +37,7 @@ pub struct Case {
     pub close: bool,
 }
 
-pub const KINDS: [&str; 16] = [
+pub const KINDS: [&str; 18] = [
     "linear",
     "pendulum",
     "hardening",
@@ -54,6 +54,8 @@ pub const KINDS: [&str; 16] = [
     "steady",
     "multiple",
     "near-pair",
+    "play",
+    "two-moving-hits",
 ];
 
 /// Draws a case; `level`: noise over the first amplitude. Of even seeds the record ends long before the ringing.
@@ -78,10 +80,11 @@ pub fn case(kind: &str, s: u64, level: f64) -> Case {
     sys.c = w / q;
     match kind {
         "multiple" => (sys.k3, a) = (0.4, 0.35),
-        "hardening" | "channels" | "two-moving" => sys.k3 = r.uniform(0.05, 0.4),
+        "hardening" | "channels" | "two-moving" | "two-moving-hits" => sys.k3 = r.uniform(0.05, 0.4),
         "softening" => sys.k3 = -r.uniform(0.05, 0.25),
         "drag-hardening" | "hits" | "steady" => sys.k3 = 0.2,
         "log" => sys.eps = r.uniform(0.003, 0.02) * if r.uniform(0.0, 1.0) < 0.5 { -1.0 } else { 1.0 },
+        "play" => sys.play = r.uniform(0.002, 0.02) * a,
         _ => {}
     }
     if kind.contains("drag") || kind == "hits" || kind == "steady" {
@@ -148,6 +151,28 @@ pub fn case(kind: &str, s: u64, level: f64) -> Case {
             lines.push(Line { poles: vec![pole(&mut r, &second, b, low)] });
             let y: Vec<f64> = clean.iter().zip(&other).map(|(x, y)| x + y).collect();
             vec![vec![noisy(&mut r, &y, 1.0)]]
+        }
+        "two-moving-hits" => {
+            let (f2, q2) = (f * r.uniform(1.3, 2.7), q * r.uniform(0.6, 1.5));
+            let (c, k3) = (TAU * f2 / q2, r.uniform(-0.2, 0.3));
+            let second = System { w: TAU * f2, c, cq: r.uniform(0.3, 1.5) / q2, k3, ..System::default() };
+            let (first_shape, second_shape) = ([1.0, -0.7, 0.4], [0.3, 0.9, 1.0]);
+            let (mut low, mut high) = ([end, a], [0.0_f64, 0.0]);
+            let hits: Vec<Vec<Vec<f64>>> = (0..2 + (s % 3) as usize)
+                .map(|_| {
+                    let starts = [a * r.uniform(0.4, 1.0), a * r.uniform(0.4, 1.0)];
+                    let ringing = [sys.run(n, fs, 24, starts[0]), second.run(n, fs, 24, starts[1])];
+                    for mode in 0..2 {
+                        high[mode] = high[mode].max(starts[mode]);
+                        low[mode] = low[mode].min(tail(&ringing[mode], 2.0 * per).max(4.0 * noise));
+                    }
+                    let sum = |c: usize, k: usize| first_shape[c] * ringing[0][k] + second_shape[c] * ringing[1][k];
+                    (0..3).map(|c| (0..n).map(|k| sum(c, k) + noise * r.normal()).collect()).collect()
+                })
+                .collect();
+            truth = vec![(sys, high[0], low[0]), (second, high[1], low[1])];
+            lines.push(Line { poles: vec![pole(&mut r, &second, high[1], low[1])] });
+            hits
         }
         "steady" => {
             let turn = w * (1.0 + r.uniform(-2.0, 2.0) / q);

@@ -13,13 +13,15 @@ pub struct System {
     pub coul: f64,
     /// Spring of power 1 + eps.
     pub eps: f64,
+    /// Half the play: no force up to there.
+    pub play: f64,
     pub pendulum: bool,
 }
 
 impl System {
     /// Whether it is not linear.
     pub fn moves(&self) -> bool {
-        self.k3 != 0.0 || self.cq != 0.0 || self.coul != 0.0 || self.eps != 0.0 || self.pendulum
+        self.k3 != 0.0 || self.cq != 0.0 || self.coul != 0.0 || self.eps != 0.0 || self.play != 0.0 || self.pendulum
     }
 
     fn spring(&self, x: f64) -> f64 {
@@ -28,6 +30,8 @@ impl System {
             w2 * x.sin()
         } else if self.eps != 0.0 {
             w2 * x * x.abs().max(1e-12).powf(self.eps)
+        } else if self.play != 0.0 {
+            w2 * (x.abs() - self.play).max(0.0) * x.signum()
         } else {
             w2 * (x + self.k3 * x.powi(3))
         }
@@ -39,6 +43,8 @@ impl System {
             w2 * 2.0 * (0.5 * x).sin().powi(2)
         } else if self.eps != 0.0 {
             w2 * x.abs().powf(2.0 + self.eps) / (2.0 + self.eps)
+        } else if self.play != 0.0 {
+            0.5 * w2 * (x.abs() - self.play).max(0.0).powi(2)
         } else {
             w2 * (0.5 * x * x + 0.25 * self.k3 * x.powi(4))
         }

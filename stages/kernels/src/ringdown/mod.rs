@@ -99,9 +99,9 @@ pub(crate) mod internals {
 }
 
 pub use channels::{
-    ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, DroppedMode, FollowedDecay, HarmonicOf, HitSystems, MOVES,
-    ModeCourse, ModeShape, ModesWanted, OrderTried, RankOne, RecordFit, ShapePoint, fit_channels, follow_channels,
-    hit_systems,
+    AmplitudeCourse, ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, DroppedMode, FollowedDecay, HarmonicOf,
+    HitSystems, MOVES, ModeCourse, ModeShape, ModesWanted, Motion, OrderTried, RankOne, RecordFit, ShapePoint,
+    fit_channels, follow_channels, hit_systems,
 };
 pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
 pub use decay::{Decay, DecayOptions, fit_decay};

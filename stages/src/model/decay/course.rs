@@ -1,36 +1,53 @@
-//! Modes of the first and of the last part of the decays, as tables and words.
+//! Modes of the first and of the last part of the decays, or along their amplitude, as tables and words.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use afmid_pipeline::Table;
 use serde_json::{Value, json};
 
+use super::along::Along;
 use crate::artifacts::Decays;
 use afmid_kernels::ringdown::{Dropped, DroppedMode, Estimate, FollowedDecay, ModeCourse, ModeEstimate};
 
-/// The modes in both parts, with the decays' times.
+/// The modes in both parts or along their amplitude, with the decays' times.
 pub(super) struct Parts<'a> {
     modes: &'a [ModeCourse],
+    along: Vec<Along<'a>>,
+    /// Largest amplitude of each mode at the first free sample, at the channel of its shape's reference.
+    first_amplitudes: Vec<f64>,
     sample_rate_hz: f64,
     /// After the decays' first free samples, s.
     end_s: f64,
 }
 
-/// One mode in one part.
-struct PartRow<'a> {
-    number: usize,
-    course: &'a ModeCourse,
-    part: &'static str,
-    mode: ModeEstimate,
-    from_s: f64,
-    to_s: f64,
+/// One mode in one part or at one amplitude.
+pub(super) struct PartRow {
+    pub mode: usize,
+    pub part: &'static str,
+    pub from_s: f64,
+    pub to_s: f64,
+    /// At its begin.
+    pub amplitude: f64,
+    pub frequency_hz: Estimate,
+    pub damping_ratio: Estimate,
+    pub frequency_z: f64,
+    pub damping_z: f64,
+    pub p_value: f64,
 }
 
 impl<'a> Parts<'a> {
     pub fn new(followed: &'a FollowedDecay, decays: &Decays<'_>) -> Self {
         let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
         let sample_rate_hz = decays.sample_rate_hz;
-        Self { modes: &followed.course, sample_rate_hz, end_s: longest as f64 / sample_rate_hz }
+        let largest = |amplitudes: &[num_complex::Complex64]| amplitudes.iter().map(|a| a.norm()).fold(0.0, f64::max);
+        Self {
+            modes: &followed.course,
+            along: followed.along.iter().map(Along::new).collect(),
+            first_amplitudes: followed.whole.shapes.iter().map(|shape| largest(&shape.amplitudes)).collect(),
+            sample_rate_hz,
+            end_s: longest as f64 / sample_rate_hz,
+        }
     }
 
     fn times(&self, course: &ModeCourse) -> [Range<f64>; 2] {
@@ -38,34 +55,42 @@ impl<'a> Parts<'a> {
         [0.0..cut_s, cut_s..self.end_s]
     }
 
-    pub fn table(&self) -> Table {
-        let row = |course: &'a ModeCourse, part, mode, time: &Range<f64>| PartRow {
-            number: course.mode + 1,
-            course,
+    /// A mode's rows of both parts.
+    fn rows(&self, course: &ModeCourse) -> [PartRow; 2] {
+        let [first, last] = self.times(course);
+        let row = |part, mode: &ModeEstimate, time: &Range<f64>| PartRow {
+            mode: course.mode + 1,
             part,
-            mode,
             from_s: time.start,
             to_s: time.end,
+            amplitude: self.first_amplitudes.get(course.mode).copied().unwrap_or(0.0)
+                * (-TAU * course.first.frequency_hz.value * course.first.damping_ratio().value * time.start).exp(),
+            frequency_hz: mode.frequency_hz,
+            damping_ratio: mode.damping_ratio(),
+            frequency_z: course.frequency_z,
+            damping_z: course.damping_z,
+            p_value: course.p_value,
         };
-        let both = |course: &'a ModeCourse| {
-            let [first, last] = self.times(course);
-            [row(course, "first", course.first, &first), row(course, "last", course.last, &last)]
-        };
-        let rows: Vec<PartRow<'_>> = self.modes.iter().flat_map(both).collect();
+        [row("first", &course.first, &first), row("last", &course.last, &last)]
+    }
+
+    pub fn table(&self) -> Table {
+        let mut rows: Vec<PartRow> = self.modes.iter().flat_map(|course| self.rows(course)).collect();
+        rows.extend(self.along.iter().flat_map(Along::rows));
+        rows.sort_by_key(|row| row.mode);
         Table::of(&rows)
-            .with("mode", "1", "number of the mode", |row| row.number)
-            .with("part", "", "part of the decays", |row| row.part)
+            .with("mode", "1", "number of the mode", |row| row.mode)
+            .with("part", "", "part of the decays, or along the amplitude of a mode that follows laws", |row| row.part)
             .with("from_s", "s", "its begin after the first free sample", |row| row.from_s)
             .with("to_s", "s", "its end", |row| row.to_s)
-            .with_std(["frequency_hz", "frequency_std_hz"], "Hz", "frequency there", |row| row.mode.frequency_hz)
-            .with_std(["damping_ratio", "damping_ratio_std"], "1", "damping ratio there", |row| {
-                row.mode.damping_ratio()
+            .with("amplitude", "", "amplitude at its begin, in the unit of the channel in `hits`", |row| row.amplitude)
+            .with_std(["frequency_hz", "frequency_std_hz"], "Hz", "frequency there", |row| row.frequency_hz)
+            .with_std(["damping_ratio", "damping_ratio_std"], "1", "damping ratio there", |row| row.damping_ratio)
+            .with("frequency_z", "1", "difference of the frequencies at both ends over its error", |row| {
+                row.frequency_z
             })
-            .with("frequency_z", "1", "difference of the parts' frequencies over its error", |row| {
-                row.course.frequency_z
-            })
-            .with("damping_z", "1", "the same of the damping ratios", |row| row.course.damping_z)
-            .with("p_value", "1", "probability of poles as far apart in a linear decay", |row| row.course.p_value)
+            .with("damping_z", "1", "the same of the damping ratios", |row| row.damping_z)
+            .with("p_value", "1", "probability of ends as far apart in a linear decay", |row| row.p_value)
             .table()
     }
 
@@ -91,23 +116,29 @@ impl<'a> Parts<'a> {
                 "damping_z": course.damping_z,
                 "p_value": course.p_value,
                 "moves": course.moves,
+                "follows": if course.moves { "no law" } else { "linear" },
                 "last_part_counts": course.far,
             })
         };
-        self.modes.iter().map(both).collect::<Vec<Value>>().into()
+        let mut all: Vec<(usize, Value)> = self.modes.iter().map(|course| (course.mode, both(course))).collect();
+        all.extend(self.along.iter().map(|along| (along.mode(), along.document())));
+        all.sort_by_key(|(mode, _)| *mode);
+        all.into_iter().map(|(_, document)| document).collect::<Vec<Value>>().into()
     }
 
     /// One for each mode that moves; `whole`: the last part does not count.
     pub fn warnings(&self, whole: bool) -> Vec<String> {
-        self.modes.iter().filter(|course| course.moves).map(|course| self.warning(course, whole)).collect()
+        let moved = self.modes.iter().filter(|course| course.moves);
+        moved.map(|course| self.warning(course, whole)).chain(self.along.iter().map(Along::warning)).collect()
     }
 
     fn warning(&self, course: &ModeCourse, whole: bool) -> String {
         let (before, after) = (course.first.damping_ratio(), course.last.damping_ratio());
         let counts = if course.far && !whole { ", the last part counts" } else { "" };
+        let law = if whole { "" } else { ", and follows no law of its amplitude" };
         format!(
             "mode {} moves while it dies away: {} Hz and a damping ratio of {} % up to {:.4} s, {} Hz and {} % from there \
-             on ({:.1} and {:.1} standard errors){counts}: not linear",
+             on ({:.1} and {:.1} standard errors){counts}: not linear{law}",
             course.mode + 1,
             digits(course.first.frequency_hz, 1.0),
             digits(before, 100.0),
@@ -134,6 +165,7 @@ pub(super) fn dropped_document(dropped: &[DroppedMode]) -> Value {
             Dropped::Broad => ("broad", None, None),
             Dropped::Undetermined => ("undetermined", None, None),
             Dropped::Companion { of, mac } => ("companion", Some(of + 1), Some(mac)),
+            Dropped::Harmonic { of, .. } => ("harmonic", Some(of + 1), None),
         };
         json!({
             "frequency_hz": dropped.mode.frequency_hz.value,

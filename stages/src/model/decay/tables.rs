@@ -43,7 +43,8 @@ pub(super) fn hit_table(fit: &ChannelRingdown, decays: &Decays<'_>) -> Table {
 }
 
 /// The hit with the largest first sample's ringing, as measured and as fitted, in every channel.
-pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
+pub(super) fn fit_array(followed: &FollowedDecay, decays: &Decays<'_>) -> Array {
+    let fit = &followed.fitted;
     let size = |hit: usize| {
         let own = fit.records.iter().filter(|record| record.event == hit);
         own.flat_map(|record| &record.residues).map(|residue| residue.norm_sqr()).sum::<f64>()
@@ -55,8 +56,12 @@ pub(super) fn fit_array(fit: &ChannelRingdown, decays: &Decays<'_>) -> Array {
     let samples = rows.first().map_or(0, |row| row.len());
     let measured: Vec<f64> = rows.iter().flat_map(|row| row.iter().copied()).collect();
     let own = fit.records.iter().filter(|record| record.event == largest);
-    let fitted: Vec<f64> = own.flat_map(|record| fit.signal(record, 1.0 / decays.sample_rate_hz, samples)).collect();
-    let rest: Vec<f64> = measured.iter().zip(&fitted).map(|(y, m)| y - m).collect();
+    let linear: Vec<f64> = own.flat_map(|record| fit.signal(record, 1.0 / decays.sample_rate_hz, samples)).collect();
+    let rest: Vec<f64> = match followed.residuals.get(largest) {
+        Some(rows) => rows.iter().flatten().copied().collect(),
+        None => measured.iter().zip(&linear).map(|(y, m)| y - m).collect(),
+    };
+    let fitted: Vec<f64> = measured.iter().zip(&rest).map(|(y, left)| y - left).collect();
     let unit = decays.sensors.first().map_or("", |sensor| &sensor.unit);
     let over = &["channel", "time"];
     Array::over(vec![

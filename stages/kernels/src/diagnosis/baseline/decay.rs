@@ -5,7 +5,7 @@ use faer::c64;
 use crate::diagnosis::data::{Bench, Record};
 use crate::diagnosis::dynamics::{Kind, Modal, Section, Sensed, Weights};
 use crate::diagnosis::options::DiagnosisOptions;
-use crate::ringdown::{ChannelOptions, RecordFit, follow_channels};
+use crate::ringdown::{ChannelOptions, Motion, RecordFit, follow_channels};
 
 /// Most modes of a structure: the library of general terms grows with their square.
 const MOST: usize = 6;
@@ -75,7 +75,7 @@ fn modes(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> O
         .collect();
     let missing = hits.iter().map(|hit| hit.iter().map(|row| gaps(row)).collect()).collect();
     let wanted = ChannelOptions { missing, ..ChannelOptions::default() };
-    let followed = follow_channels(&hits, &[], bench.interval_s, &wanted, false).ok()?;
+    let followed = follow_channels(&hits, &[], bench.interval_s, &wanted, Motion::LastPart).ok()?;
     let found = &followed.fit;
     let channels = bench.layout.channels;
     // what each mode is in each channel, per unit of that channel, in its largest hit

@@ -25,6 +25,13 @@ pub enum Dropped {
         /// Modal assurance criterion between the shapes.
         mac: f64,
     },
+    /// It is a multiple of the phase of a mode that moves with its amplitude.
+    Harmonic {
+        /// Number of that mode, from 0, among the modes that are left.
+        of: usize,
+        /// 2 or 3.
+        multiple: usize,
+    },
 }
 
 /// A fitted exponential that is no mode.
@@ -37,7 +44,7 @@ pub struct DroppedMode {
 }
 
 /// Standard errors exceeded by noise alone once in a thousand (one-sided).
-const DETERMINED: f64 = 3.09;
+pub(super) const DETERMINED: f64 = 3.09;
 /// Share of a shape's energy that may be orthogonal to a stronger mode's: what lies there is known no better than the
 /// lack of fit. Noise adds three times its own share.
 const ORTHOGONAL: (f64, f64) = (0.05, 3.0);
@@ -170,7 +177,11 @@ impl ChannelRingdown {
 
     /// The same without these modes, which stay in what was fitted: nuisances.
     pub(super) fn without(&self, modes: &[usize]) -> Self {
-        let keep: Vec<usize> = (0..self.poles.len()).filter(|j| !modes.contains(j)).collect();
+        self.chosen(&(0..self.poles.len()).filter(|j| !modes.contains(j)).collect::<Vec<usize>>())
+    }
+
+    /// These modes, in this order.
+    pub(super) fn chosen(&self, keep: &[usize]) -> Self {
         let place = |i: usize| 2 * keep[i / 2] + i % 2;
         let mut out = self.clone();
         out.poles = keep.iter().map(|&j| self.poles[j]).collect();

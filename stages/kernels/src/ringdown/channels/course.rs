@@ -5,6 +5,7 @@ use std::ops::Range;
 use faer::c64;
 
 use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady, undetermined};
+use super::laws::{AmplitudeCourse, LawFit, follow_laws, oscillations};
 use super::levels::density;
 use super::options::{ChannelOptions, ModesWanted};
 use super::order::fit_channels;
@@ -37,10 +38,22 @@ pub struct ModeCourse {
     pub far: bool,
 }
 
+/// What stands for a mode that moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// One linear mode for all of each decay.
+    Whole,
+    /// The linear mode of its last part, where it has moved far.
+    LastPart,
+    /// Its laws at the smallest amplitude, where it follows laws of its amplitude; its last part where it does not.
+    Laws,
+}
+
 /// A fit of decays, its companions left out, and how its modes change.
 #[derive(Debug, Clone)]
 pub struct FollowedDecay {
-    /// Modes of all of the decays; those that have moved far have the poles and shapes of their last part.
+    /// Modes of all of the decays; those that follow laws of their amplitude at the smallest one, others that have moved
+    /// far with the poles and shapes of their last part.
     pub fit: ChannelRingdown,
     /// The same modes by the fit of all of the decays alone.
     pub whole: ChannelRingdown,
@@ -48,8 +61,12 @@ pub struct FollowedDecay {
     pub fitted: ChannelRingdown,
     /// Fitted exponentials that are no modes.
     pub dropped: Vec<DroppedMode>,
-    /// Modes that both of their parts have, ascending.
+    /// Modes that both of their parts have, ascending; without those that follow laws.
     pub course: Vec<ModeCourse>,
+    /// Modes that follow laws of their amplitude, ascending.
+    pub along: Vec<AmplitudeCourse>,
+    /// What is left of hits x channels x samples under these laws; empty where no mode follows any.
+    pub residuals: Vec<Vec<Vec<f64>>>,
 }
 
 /// Probability that any mode of a linear decay is said to move.
@@ -78,7 +95,8 @@ pub(super) const FAR: f64 = 0.1;
 ///
 /// # Model
 /// As [`fit_channels`] in each part. A mode whose frequency and damping change while it dies away is several
-/// exponentials in a linear fit: these companions lie in its line and have its shape.
+/// exponentials in a linear fit: these companions lie in its line and have its shape. With [`Motion::Laws`] such a mode
+/// is one whose frequency and damping are functions of its amplitude ([`follow_moving`](crate::ringdown::moving)).
 /// # Method
 /// Exponentials in the line of a slower one, of its shape and at least twice as fast, are dropped ([`Dropped`]): their
 /// modes are fitted again without them, errors widened by what is then left round each line; of all other modes they
@@ -88,7 +106,7 @@ pub(super) const FAR: f64 = 0.1;
 /// both poles at the level [`MOVES`] for all modes together). With one channel every shape is the same: there the line
 /// and the rate decide.
 /// # Shapes
-/// As [`fit_channels`]; `whole`: the fit is that of the whole even where modes move.
+/// As [`fit_channels`]; `motion`: what stands for modes that move.
 /// # Units
 /// As [`fit_channels`].
 /// # Accuracy
@@ -102,12 +120,32 @@ pub fn follow_channels(
     free: &[Vec<&[f64]>],
     interval_s: f64,
     options: &ChannelOptions,
-    whole: bool,
+    motion: Motion,
 ) -> Result<FollowedDecay, ModelError> {
     let all = fit_channels(events, free, interval_s, options)?;
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
+    let linear = follow_linear(&all, events, free, interval_s, options, (fixed, motion == Motion::Whole));
+    if fixed || motion != Motion::Laws {
+        return linear;
+    }
+    let records = LawFit { all: &all, events, interval_s, options };
+    match linear {
+        Ok(linear) => follow_laws(&records, linear),
+        Err(error) => oscillations(&records).ok_or(error),
+    }
+}
+
+/// The same of modes that are linear in each part.
+fn follow_linear(
+    all: &ChannelRingdown,
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+    (fixed, whole): (bool, bool),
+) -> Result<FollowedDecay, ModelError> {
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
-    let no_modes = if fixed { Vec::new() } else { no_modes(&all, longest as f64 * interval_s)? };
+    let no_modes = if fixed { Vec::new() } else { no_modes(all, longest as f64 * interval_s)? };
     let mut dropped: Vec<DroppedMode> = no_modes.iter().map(|(_, mode)| *mode).collect();
     let gone: Vec<usize> = no_modes.iter().map(|(j, _)| *j).collect();
     let mut fit = all.without(&gone);
@@ -145,7 +183,8 @@ pub fn follow_channels(
     for (mode, (last, number)) in course.iter().zip(&late).filter(|(mode, _)| mode.far && !whole) {
         fit.take_pole(mode.mode, last, *number);
     }
-    Ok(FollowedDecay { fit, whole: whole_fit, fitted: all, dropped, course })
+    let (along, residuals) = (Vec::new(), Vec::new());
+    Ok(FollowedDecay { fit, whole: whole_fit, fitted: all.clone(), dropped, course, along, residuals })
 }
 
 /// Fitted exponentials that are no modes, by number: lines that do not die away, what has no maximum in its response.
@@ -268,7 +307,7 @@ fn seen(fit: &ChannelRingdown, interval_s: f64, part: &Range<usize>, least: f64)
 }
 
 /// For each of the `start` poles the number of the fitted one that it has become: the nearest pair first.
-fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
+pub(super) fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
     let distance = |(i, j): &(usize, usize)| (start[*i] - fitted[*j]).norm();
     let mut pairs: Vec<(usize, usize)> =
         (0..start.len()).flat_map(|i| (0..fitted.len()).map(move |j| (i, j))).collect();
@@ -282,7 +321,7 @@ fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
     found
 }
 
-fn nearest(poles: &[c64], to: c64) -> Option<usize> {
+pub(super) fn nearest(poles: &[c64], to: c64) -> Option<usize> {
     (0..poles.len()).min_by(|&a, &b| (poles[a] - to).norm().total_cmp(&(poles[b] - to).norm()))
 }
 

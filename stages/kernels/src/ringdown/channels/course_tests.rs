@@ -79,7 +79,7 @@ fn slopes(path: &[(f64, f64)]) -> (f64, f64) {
 
 fn followed(data: &[Vec<f64>]) -> FollowedDecay {
     let event: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
-    follow_channels(&[event], &[], INTERVAL_S, &ChannelOptions::default(), false).unwrap()
+    follow_channels(&[event], &[], INTERVAL_S, &ChannelOptions::default(), Motion::LastPart).unwrap()
 }
 
 #[test]
@@ -186,7 +186,7 @@ fn a_relaxation_beside_the_modes_is_no_mode_and_does_not_bias_them() {
         let mut y = records(&modes, 1, 0.005, 500 + seed);
         y[0].iter_mut().enumerate().for_each(|(k, y)| *y += relaxes(k));
         let rows = vec![vec![y[0].as_slice()]];
-        let found = follow_channels(&rows, &[], INTERVAL_S, &ChannelOptions::default(), true).expect("a fit");
+        let found = follow_channels(&rows, &[], INTERVAL_S, &ChannelOptions::default(), Motion::Whole).expect("a fit");
         moved += found.course.iter().filter(|mode| mode.moves).count();
         let firsts: Vec<ModeEstimate> = found.course.iter().map(|mode| mode.first).collect();
         let estimates = found.fit.modes();
@@ -264,7 +264,8 @@ fn a_hit_that_ends_soon_after_the_cut_leaves_the_course_of_the_others() {
     for more in [1, 10, 23, 60] {
         let second = records(&[mover], 1, 1e-3, 71);
         let events = vec![vec![first[0].as_slice()], vec![&second[0][..cut + more]]];
-        let found = follow_channels(&events, &[], INTERVAL_S, &ChannelOptions::default(), false).expect("a fit");
+        let found =
+            follow_channels(&events, &[], INTERVAL_S, &ChannelOptions::default(), Motion::LastPart).expect("a fit");
         assert!(found.course.first().is_some_and(|mode| mode.moves), "{more}: {:?}", found.course);
     }
 }

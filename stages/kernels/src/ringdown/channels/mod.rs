@@ -4,7 +4,8 @@
 //! projection (amplitudes solved for), fit (the search on poles), noise (of each channel), levels (of what
 //! is left round a line), bank (where another mode may be), order
 //! (how many there are), shape (rank-one residues), result,
-//! companions (what is no mode), course (whether modes move: [`follow_channels`]), systems (whether all hits are of one:
+//! companions (what is no mode), course (whether modes move: [`follow_channels`]), laws (those that follow laws of their
+//! amplitude), systems (whether all hits are of one:
 //! [`hit_systems`]).
 
 mod bank;
@@ -14,6 +15,7 @@ mod course;
 #[cfg(test)]
 mod course_tests;
 mod fit;
+mod laws;
 mod levels;
 mod noise;
 mod options;
@@ -22,6 +24,7 @@ mod projection;
 mod records;
 mod recursion;
 mod result;
+mod rows;
 mod shape;
 mod systems;
 #[cfg(test)]
@@ -30,7 +33,8 @@ mod systems_tests;
 mod tests;
 
 pub use companions::{Dropped, DroppedMode, HarmonicOf};
-pub use course::{FollowedDecay, MOVES, ModeCourse, follow_channels};
+pub use course::{FollowedDecay, MOVES, ModeCourse, Motion, follow_channels};
+pub use laws::AmplitudeCourse;
 pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;
 pub use result::{ChannelRingdown, OrderTried, RecordFit};

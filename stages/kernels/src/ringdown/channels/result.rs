@@ -177,6 +177,12 @@ impl ChannelRingdown {
         signal(&Poles(self.poles.clone()), &own, interval_s, samples, true)
     }
 
+    /// The ringing of a record alone, without its level.
+    pub(super) fn ringing(&self, record: &RecordFit, interval_s: f64, samples: usize) -> Vec<f64> {
+        let own: Vec<f64> = record.residues.iter().flat_map(|residue| [residue.re, residue.im]).chain([0.0]).collect();
+        signal(&Poles(self.poles.clone()), &own, interval_s, samples, false)
+    }
+
     /// Modal assurance criteria between the shapes: modes x modes, 1 on the diagonal.
     pub fn mac(&self) -> Mat<f64> {
         Mat::from_fn(self.shapes.len(), self.shapes.len(), |i, j| self.shapes[i].mac(&self.shapes[j]))

@@ -4,7 +4,7 @@ use faer::c64;
 use rayon::prelude::*;
 
 use super::companions::energies;
-use super::course::{FAR, MOVES, follow_channels};
+use super::course::{FAR, MOVES, Motion, follow_channels};
 use super::options::{ChannelOptions, ModesWanted};
 use super::result::ChannelRingdown;
 use crate::ringdown::ModeEstimate;
@@ -98,7 +98,7 @@ impl Alone {
     ) -> Option<Self> {
         let missing = options.missing.get(hit).map(|gaps| vec![gaps.clone()]).unwrap_or_default();
         let options = ChannelOptions { modes: ModesWanted::AtMost(MODES), missing, ..options.clone() };
-        let followed = follow_channels(&[event.to_vec()], free, interval_s, &options, true).ok()?;
+        let followed = follow_channels(&[event.to_vec()], free, interval_s, &options, Motion::Whole).ok()?;
         let fit = followed.whole;
         let modes = fit.modes();
         let mut motion = vec![0.0; modes.len()];

@@ -1,0 +1,233 @@
+//! The rows of a fit of decays while lines become modes that follow laws.
+
+use std::f64::consts::TAU;
+
+use faer::{Mat, c64};
+
+use super::companions::{Dropped, DroppedMode, energies};
+use super::course::{FollowedDecay, nearest};
+use super::laws::AmplitudeCourse;
+use super::result::ChannelRingdown;
+use super::shape::ShapePoint;
+use crate::ringdown::moving::FollowedMode;
+use crate::ringdown::{Estimate, ModeEstimate};
+
+/// Rows with tags that stay while others come and go.
+pub(super) struct Rows<'a> {
+    followed: FollowedDecay,
+    /// The fit with all exponentials.
+    all: &'a ChannelRingdown,
+    /// Of each row its tag, ...
+    tags: Vec<usize>,
+    /// ... and the exponential that it was.
+    from: Vec<usize>,
+    /// Of each dropped mode the exponential that it was.
+    dropped_from: Vec<usize>,
+    next: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// Tags are the numbers of the modes.
+    pub fn of(followed: FollowedDecay, all: &'a ChannelRingdown) -> Self {
+        let at = |pole: c64| nearest(&all.poles, pole).unwrap_or(0);
+        let from: Vec<usize> = followed.whole.poles.iter().map(|pole| at(*pole)).collect();
+        let dropped_from = followed.dropped.iter().map(|d| at(pole_of(&d.mode))).collect();
+        let next = from.len();
+        Self { followed, all, tags: (0..next).collect(), from, dropped_from, next }
+    }
+
+    fn place(&self, tag: usize) -> Option<usize> {
+        self.tags.iter().position(|own| *own == tag)
+    }
+
+    /// Tags of the rows that are of these exponentials.
+    pub fn of_poles(&self, own: &[usize]) -> Vec<usize> {
+        self.tags.iter().zip(&self.from).filter(|(_, from)| own.contains(from)).map(|(tag, _)| *tag).collect()
+    }
+
+    /// The row with the most energy.
+    pub fn strongest(&self, tags: &[usize]) -> usize {
+        let energy = energies(&self.followed.whole);
+        let of = |tag: usize| self.place(tag).map_or(0.0, |at| energy[at]);
+        tags.iter().copied().max_by(|a, b| of(*a).total_cmp(&of(*b))).unwrap_or(0)
+    }
+
+    /// A further row, of an exponential. Its tag.
+    pub fn restored(&mut self, exponential: usize) -> usize {
+        for fit in [&mut self.followed.fit, &mut self.followed.whole] {
+            fit.append(self.all, exponential);
+        }
+        self.tags.push(self.next);
+        self.from.push(exponential);
+        self.next += 1;
+        self.next - 1
+    }
+
+    /// An exponential that was taken for a companion is a mode of its own.
+    pub fn undrop_companion(&mut self, exponential: usize) {
+        let is_one = |(dropped, from): (&DroppedMode, &usize)| {
+            *from == exponential && matches!(dropped.reason, Dropped::Companion { .. })
+        };
+        if let Some(at) = self.followed.dropped.iter().zip(&self.dropped_from).position(is_one) {
+            self.followed.dropped.remove(at);
+            self.dropped_from.remove(at);
+            self.restored(exponential);
+        }
+    }
+
+    /// All of these exponentials but one row are companions of that row.
+    pub fn drop_but(&mut self, own: &[usize], tag: usize) {
+        let mac = |at: usize| match self.place(tag) {
+            Some(kept) => self.followed.whole.shapes[at].mac(&self.followed.whole.shapes[kept]),
+            None => 1.0,
+        };
+        let others: Vec<(usize, Dropped)> = (0..self.tags.len())
+            .filter(|&at| self.tags[at] != tag && own.contains(&self.from[at]))
+            .map(|at| (self.tags[at], Dropped::Companion { of: tag, mac: mac(at) }))
+            .collect();
+        others.into_iter().for_each(|(other, reason)| self.drop_row(other, reason));
+        let kept = self.place(tag).map(|at| self.from[at]);
+        self.forget(kept);
+        for (dropped, from) in self.followed.dropped.iter_mut().zip(&self.dropped_from) {
+            if own.contains(from) && !matches!(dropped.reason, Dropped::Companion { .. }) {
+                dropped.reason = Dropped::Companion { of: tag, mac: 1.0 };
+            }
+        }
+    }
+
+    /// Takes the exponential that is a row now from the list of those that are none.
+    fn forget(&mut self, exponential: Option<usize>) {
+        while let Some(at) = self.dropped_from.iter().position(|from| Some(*from) == exponential) {
+            self.followed.dropped.remove(at);
+            self.dropped_from.remove(at);
+        }
+    }
+
+    /// All rows of these exponentials are no modes.
+    pub fn drop_all(&mut self, own: &[usize], reason: Dropped) {
+        self.of_poles(own).into_iter().for_each(|tag| self.drop_row(tag, reason));
+    }
+
+    fn drop_row(&mut self, tag: usize, reason: Dropped) {
+        let Some(at) = self.place(tag) else { return };
+        self.followed.dropped.push(DroppedMode { mode: self.followed.whole.modes()[at], reason });
+        self.dropped_from.push(self.from[at]);
+        self.followed.fit = self.followed.fit.without(&[at]);
+        self.followed.whole = self.followed.whole.without(&[at]);
+        self.tags.remove(at);
+        self.from.remove(at);
+        self.followed.course.retain(|course| course.mode != tag);
+    }
+
+    /// A row has the values of laws at the smallest amplitude.
+    pub fn take_laws(&mut self, tag: usize, mode: &FollowedMode, lack_of_fit: f64) {
+        self.take_linear(tag, mode, lack_of_fit);
+        self.followed.course.retain(|course| course.mode != tag);
+        self.followed.along.push(AmplitudeCourse { mode: tag, laws: mode.clone() });
+    }
+
+    /// A row has frequency, damping, shape and amplitudes of a mode.
+    pub fn take_linear(&mut self, tag: usize, mode: &FollowedMode, lack_of_fit: f64) {
+        let Some(at) = self.place(tag) else { return };
+        let Some(low) = mode.course.first() else { return };
+        for fit in [&mut self.followed.fit, &mut self.followed.whole] {
+            fit.take_values(at, low.frequency_hz, low.damping_ratio, lack_of_fit);
+            fit.take_ringing(at, mode);
+        }
+    }
+
+    /// Rows ascending, numbers instead of tags.
+    pub fn finished(mut self, residuals: Vec<Vec<Vec<f64>>>) -> FollowedDecay {
+        let mut order: Vec<usize> = (0..self.tags.len()).collect();
+        let poles = &self.followed.fit.poles;
+        order.sort_by(|&a, &b| poles[a].norm().total_cmp(&poles[b].norm()));
+        let number = |tag: usize| order.iter().position(|&at| self.tags[at] == tag);
+        for dropped in &mut self.followed.dropped {
+            match &mut dropped.reason {
+                Dropped::Companion { of, .. } | Dropped::Harmonic { of, .. } => *of = number(*of).unwrap_or(0),
+                _ => {}
+            }
+        }
+        self.followed.course.iter_mut().for_each(|course| course.mode = number(course.mode).unwrap_or(0));
+        self.followed.along.iter_mut().for_each(|along| along.mode = number(along.mode).unwrap_or(0));
+        self.followed.course.sort_by_key(|course| course.mode);
+        self.followed.along.sort_by_key(|along| along.mode);
+        self.followed.fit = self.followed.fit.chosen(&order);
+        self.followed.whole = self.followed.whole.chosen(&order);
+        self.followed.residuals = residuals;
+        self.followed
+    }
+}
+
+impl ChannelRingdown {
+    /// Takes over a mode of another fit of the same records as a further one, its errors independent of the others'.
+    fn append(&mut self, other: &Self, from: usize) {
+        let old = self.covariance.clone();
+        let size = old.nrows();
+        self.covariance = Mat::from_fn(size + 2, size + 2, |i, j| {
+            if i < size && j < size {
+                old[(i, j)]
+            } else if i >= size && j >= size {
+                other.covariance[(2 * from + i - size, 2 * from + j - size)]
+            } else {
+                0.0
+            }
+        });
+        self.poles.push(other.poles[from]);
+        self.shapes.push(other.shapes[from].clone());
+        self.lack_of_fit.push(other.lack_of_fit[from]);
+        for (own, record) in self.records.iter_mut().zip(&other.records) {
+            own.residues.push(record.residues[from]);
+            own.residue_covariance.push(record.residue_covariance[from]);
+        }
+    }
+
+    /// Natural frequency and damping ratio of a mode, their errors independent.
+    fn take_values(&mut self, mode: usize, frequency_hz: Estimate, damping_ratio: Estimate, lack_of_fit: f64) {
+        let (omega, ratio) = (TAU * frequency_hz.value, damping_ratio.value.clamp(LEAST_RATIO, 0.99));
+        let turn = (1.0 - ratio * ratio).sqrt();
+        self.poles[mode] = c64::new(-ratio * omega, turn * omega);
+        // change of the pole's parts with frequency and damping ratio
+        let (by_omega, by_ratio) = ([-ratio, turn], [-omega, -omega * ratio / turn]);
+        let variance = [(TAU * frequency_hz.std).powi(2), damping_ratio.std.powi(2)];
+        for a in 0..2 {
+            for i in 0..self.covariance.nrows() {
+                self.covariance[(2 * mode + a, i)] = 0.0;
+                self.covariance[(i, 2 * mode + a)] = 0.0;
+            }
+        }
+        for a in 0..2 {
+            for b in 0..2 {
+                self.covariance[(2 * mode + a, 2 * mode + b)] =
+                    variance[0] * by_omega[a] * by_omega[b] + variance[1] * by_ratio[a] * by_ratio[b];
+            }
+        }
+        self.lack_of_fit[mode] = lack_of_fit;
+    }
+
+    /// Shape and amplitudes of a mode; errors of the shape stay.
+    fn take_ringing(&mut self, mode: usize, by: &FollowedMode) {
+        let amplitudes: Vec<c64> = by.starts.iter().map(|(size, phase)| c64::cis(*phase) * *size).collect();
+        for record in &mut self.records {
+            record.residues[mode] = amplitudes[record.event] * by.shape[record.channel];
+        }
+        let shape = &mut self.shapes[mode];
+        // errors relative to another reference are of that one's value
+        let scale = by.shape[shape.reference].norm_sqr();
+        for (point, value) in shape.points.iter_mut().zip(&by.shape) {
+            *point = ShapePoint { value: *value, covariance: point.covariance.map(|entry| entry * scale) };
+        }
+        shape.points[by.reference].covariance = [0.0; 3];
+        shape.reference = by.reference;
+        shape.amplitudes = amplitudes;
+    }
+}
+
+/// Damping ratio of a row, at least: nothing rings for longer than a hundred million periods.
+const LEAST_RATIO: f64 = 1e-9;
+
+/// Pole of a mode, rad/s.
+fn pole_of(mode: &ModeEstimate) -> c64 {
+    let (omega, ratio) = (TAU * mode.frequency_hz.value, mode.damping_ratio().value);
+    c64::new(-ratio * omega, omega * (1.0 - ratio * ratio).max(0.0).sqrt())
+}
