@@ -22,8 +22,8 @@ fn pattern(config: &Path) -> String {
 fn a_config_in_any_folder_finds_the_recordings_that_it_was_made_for() {
     let scratch = tempfile::tempdir().expect("a folder");
     let top = scratch.path();
-    let here = top.join("above/work");
-    for folder in ["above/work/archive", "above/work/sub", "above/work/od[d]", "far/deep", "above/archive", "archive"] {
+    let here = top.join("above/lab");
+    for folder in ["above/lab/archive", "above/lab/sub", "above/lab/od[d]", "far/deep", "above/archive", "archive"] {
         fs::create_dir_all(top.join(folder)).expect("a folder");
     }
     for (folder, seed) in [("archive", 1), ("od[d]", 2)] {
@@ -61,5 +61,5 @@ fn a_config_in_any_folder_finds_the_recordings_that_it_was_made_for() {
     }
     assert_eq!(pattern(&here.join("x0.toml")), "archive/*.h5");
     assert_eq!(pattern(&here.join("../x0.toml")), "work/archive/*.h5");
-    assert_eq!(pattern(&here.join("link/x0.toml")), "../../above/work/archive/*.h5");
+    assert_eq!(pattern(&here.join("link/x0.toml")), "../../above/lab/archive/*.h5");
 }
