@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use self::between::{between_document, name_of};
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
+use super::excitation::require_more_than_a_sine;
 use super::known::KnownNumber;
 use super::order::simulated_percent;
 use super::pem::{MODEL, PAIR, RESIDUALS, SUMMARY, ending};
@@ -98,7 +99,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 8,
+        version: 9,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
@@ -126,6 +127,9 @@ impl Stage for GreyEstimate {
         let (rate, first) = (pair.sample_rate_hz()?, pair.first_sample(self.before_s)?);
         let series = pair.series(self.set, first)?;
         let options = self.options(inputs.find(&START)?)?;
+        if let Err(one) = require_more_than_a_sine(&series.input, &series.output, rate) {
+            cx.warn(one.problem);
+        }
         let experiment = Experiment { input: &series.input, output: &series.output };
         let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
         let test = residual_test(&fit);

@@ -8,6 +8,7 @@ mod decay;
 mod decay_example;
 mod era;
 mod example;
+mod excitation;
 mod frf_modes;
 mod frf_modes_example;
 mod grey;

@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::excitation::require_more_than_a_sine;
 use super::order::{Order, choice_document, simulated_percent};
 use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
@@ -35,7 +36,8 @@ type Tested = Result<TestResult, ModelError>;
 /// Units: volts to volts where the force is given as static deflection.
 /// Accuracy: the Cramer-Rao bound within some per cent where the noise is white plus thermal. The covariance follows
 /// the residual's own spectrum, so wander that the model leaves is counted.
-/// Errors: too few samples for the order, values that are not finite, a response that is constant; missing outputs,
+/// Errors: too few samples for the order, values that are not finite, a response that is constant; an input that is one
+/// sine, of which nothing else shows in the output; missing outputs,
 /// unless the errors that are made small are those of the simulation without noise filter (`noise = "white"`), which
 /// leaves them out. No convergence is a warning, and so is a residual that is not white (Ljung-Box, p < 0.001).
 /// Source: Stark et al. 2005, Eq. 8; L. Ljung, System Identification, 1999, chapters 7 and 10.
@@ -89,7 +91,7 @@ impl Stage for Pem {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 12,
+        version: 13,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -107,6 +109,7 @@ impl Stage for Pem {
         self.require_set(&pair)?;
         let (rate, first) = (pair.sample_rate_hz()?, pair.first_sample(self.before_s)?);
         let PairSeries { input, output, time, unit, .. } = pair.series(self.set, first)?;
+        require_more_than_a_sine(&input, &output, rate)?;
         let experiment = Experiment { input: &input, output: &output };
         let choice = match self.order {
             Order::Fixed(_) => None,

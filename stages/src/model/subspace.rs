@@ -4,6 +4,7 @@ use afmid_pipeline::{Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::excitation::require_more_than_a_sine;
 use super::order::Order;
 use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
@@ -24,7 +25,8 @@ use afmid_kernels::validation::{OrderChoice, choose_order};
 /// Units: those of the pair.
 /// Accuracy: consistent, but not efficient: above the errors of `model.pem`, without its iterations. The covariance
 /// takes the poles' errors as those of output error at this point.
-/// Errors: too few samples for the block rows, values that are missing or not finite, a response that is constant.
+/// Errors: too few samples for the block rows, values that are missing or not finite, a response that is constant, an
+/// input that is one sine, of which nothing else shows in the output.
 /// Source: P. Van Overschee and B. De Moor, Subspace Identification for Linear Systems, 1996; M. Verhaegen and P.
 /// Dewilde, Int. J. Control 56 (1992) 1187.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -66,7 +68,7 @@ impl Default for SubspaceEstimate {
 impl Stage for SubspaceEstimate {
     const SPEC: Spec = Spec {
         name: "model.subspace",
-        version: 7,
+        version: 8,
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],
@@ -81,6 +83,7 @@ impl Stage for SubspaceEstimate {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
+        require_more_than_a_sine(&series.input, &series.output, series.rate)?;
         let choice = match self.order {
             Order::Fixed(_) => None,
             Order::Auto => Some(self.choose(&series, cx)?),

@@ -37,6 +37,7 @@ mod order_choice;
 mod resampled;
 mod residual;
 mod shortlist;
+mod single_sine;
 
 pub use bootstrap::{BootstrapSettings, Bootstrapped, bootstrap};
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
@@ -44,3 +45,4 @@ pub use fit::{Nuisances, Simulation, fit_percent, noise_ceiling_percent, simulat
 pub use order_choice::{OrderCandidate, OrderChoice, choose_order, largest_gap};
 pub use resampled::{Drawing, Intervals, RootInterval};
 pub use residual::{TestResult, input_dependence, whiteness};
+pub use single_sine::{SingleSine, single_sine};
