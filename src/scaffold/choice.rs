@@ -1,7 +1,7 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::harmonics::is_tone;
-use afmid_kernels::spectra::{is_impulsive, shows_resonance};
+use afmid_kernels::spectra::{is_impulsive, rings_on, shows_resonance};
 use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
@@ -136,6 +136,13 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let best = source.best.and_then(|index| source.channels.get(index));
     let best = best.filter(|best| found.iter().any(|channel| channel.location == best.location));
     let outputs = if wanted.channels.is_empty() { like(&found, best.unwrap_or(found[0]), file) } else { found };
+    if goal.is_none()
+        && struck
+        && records_are.is_none()
+        && let Some(choice) = rings_into_the_next(file, wanted, inputs[0], &outputs)?
+    {
+        return Ok(choice);
+    }
     let several = struck || records_are.is_some() || outputs.len() > 1;
     let goal = goal.unwrap_or(if several { Goal::Frf } else { Goal::InputOutput });
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
@@ -155,6 +162,37 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
     let notes = left_out(source, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
     Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
+}
+
+/// Free decays where a structure still rings when a hit's block ends: responses by blocks would be of more than the block.
+fn rings_into_the_next<'a>(
+    file: &FirstFile<'a>,
+    wanted: &Wanted<'_>,
+    force: &Channel,
+    outputs: &[&'a Channel],
+) -> Result<Option<Choice<'a>>, Question> {
+    let values = outputs.iter().map(|channel| file.samples(channel)).collect::<Result<Vec<_>, _>>()?;
+    let rows: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    let Some(share) = rings_on(&file.samples(force)?, &rows) else { return Ok(None) };
+    let (_, found) = file.search(outputs, wanted)?;
+    if found.decays.is_empty() {
+        return Ok(None);
+    }
+    let decays = match found.decays.len() {
+        1 => "a free decay".to_owned(),
+        count => format!("{count} free decays"),
+    };
+    let names: Vec<&str> = outputs.iter().map(|channel| channel.location.as_str()).collect();
+    let why = format!(
+        "{} of {} in {}: {:.0} % of the amplitude is left where the next hit or the end comes, which frequency responses \
+         by blocks do not bear; --goal frf makes them all the same, --goal input-output fits {} to one of them",
+        decays,
+        names.join(", "),
+        file.source.name(),
+        100.0 * share,
+        force.location
+    );
+    Ok(Some(Choice::of(Goal::Decay, outputs.to_vec(), why)))
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
