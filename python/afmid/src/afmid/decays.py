@@ -31,7 +31,7 @@ class Ringdown:
     hits: pd.DataFrame
     """Amplitude and phase of each mode in each hit."""
     course: pd.DataFrame
-    """Each mode in the first and in the last part of the decays: whether it moves with its amplitude."""
+    """Each mode in the first and in the last part of the decays, or at twelve amplitudes where it follows laws of them."""
     residuals: xr.Dataset
     """The largest hit as measured, as fitted, and what is left, over channel and time."""
     events: pd.DataFrame | None
@@ -126,7 +126,8 @@ def ringdown(
     noise : {"estimated", "white"}
         Noise beside the ringing: white and wander of each channel, or white alone.
     part : {"auto", "whole"}
-        What counts of a mode that moves far while it dies away: its last part, or all.
+        What counts of a mode that moves while it dies away: "auto" its laws at the smallest amplitude, or its last part
+        where it follows none; "whole" one linear mode for all.
     drift : bool
         Whether a linear drift of each record is estimated.
     false_alarm : float

@@ -156,7 +156,7 @@ pub fn case(kind: &str, s: u64, level: f64) -> Case {
             let (f2, q2) = (f * r.uniform(1.3, 2.7), q * r.uniform(0.6, 1.5));
             let (c, k3) = (TAU * f2 / q2, r.uniform(-0.2, 0.3));
             let second = System { w: TAU * f2, c, cq: r.uniform(0.3, 1.5) / q2, k3, ..System::default() };
-            let (first_shape, second_shape) = ([1.0, -0.7, 0.4], [0.3, 0.9, 1.0]);
+            let (first_shape, second_shape) = ([1.0, -0.7, 0.4], [1.0, 0.9, -0.3]);
             let (mut low, mut high) = ([end, a], [0.0_f64, 0.0]);
             let hits: Vec<Vec<Vec<f64>>> = (0..2 + (s % 3) as usize)
                 .map(|_| {

@@ -124,33 +124,42 @@ pub fn follow_channels(
 ) -> Result<FollowedDecay, ModelError> {
     let all = fit_channels(events, free, interval_s, options)?;
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
-    let linear = follow_linear(&all, events, free, interval_s, options, (fixed, motion == Motion::Whole));
-    if fixed || motion != Motion::Laws {
-        return linear;
-    }
     let records = LawFit { all: &all, events, interval_s, options };
-    match linear {
-        Ok(linear) => follow_laws(&records, linear),
+    let linear =
+        |one_line: &[(usize, usize)]| follow_linear(&records, free, (fixed, motion == Motion::Whole), one_line);
+    if fixed || motion != Motion::Laws {
+        return linear(&[]);
+    }
+    match linear(&[]) {
+        Ok(found) => follow_laws(&records, found, &linear),
         Err(error) => oscillations(&records).ok_or(error),
     }
 }
 
-/// The same of modes that are linear in each part.
+/// The same of modes that are linear in each part; `one_line`: pairs of exponentials of which the first is no mode beside
+/// the second.
 fn follow_linear(
-    all: &ChannelRingdown,
-    events: &[Vec<&[f64]>],
+    records: &LawFit<'_>,
     free: &[Vec<&[f64]>],
-    interval_s: f64,
-    options: &ChannelOptions,
     (fixed, whole): (bool, bool),
+    one_line: &[(usize, usize)],
 ) -> Result<FollowedDecay, ModelError> {
+    let LawFit { all, events, interval_s, options } = *records;
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
     let no_modes = if fixed { Vec::new() } else { no_modes(all, longest as f64 * interval_s)? };
     let mut dropped: Vec<DroppedMode> = no_modes.iter().map(|(_, mode)| *mode).collect();
     let gone: Vec<usize> = no_modes.iter().map(|(j, _)| *j).collect();
     let mut fit = all.without(&gone);
     let mut decays = Decays { events, free, interval_s, options, others: all.only(&gone) };
-    let found = if fixed { Vec::new() } else { companions(&fit) };
+    let mut found = if fixed { Vec::new() } else { companions(&fit) };
+    for (more, of) in one_line {
+        let at = |j: usize| fit.poles.iter().position(|pole| *pole == all.poles[j]);
+        let (more, of) = (at(*more), at(*of));
+        if let (Some(more), Some(of)) = (more, of) {
+            found.retain(|pair| pair.0 != more && pair.0 != of);
+            found.push((more, of, fit.shapes[more].mac(&fit.shapes[of])));
+        }
+    }
     let mut alone = fit.clone();
     if !found.is_empty() {
         let gone: Vec<usize> = found.iter().map(|pair| pair.0).collect();

@@ -1,17 +1,17 @@
 //! Modes that follow laws of their amplitude: what the lines of a linear fit are by the data.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use faer::c64;
 
 use super::companions::{DETERMINED, Dropped, DroppedMode, broad, energies};
-use super::course::{FollowedDecay, MOVES, nearest};
-use super::levels::density;
+use super::course::{FollowedDecay, nearest};
+use super::lines::{Lines, near};
 use super::options::ChannelOptions;
 use super::result::ChannelRingdown;
-use super::rows::Rows;
+use super::rows::{Rows, pole_of};
 use crate::model::{ModelError, go_on};
-use crate::ringdown::moving::{self, Exponential, FollowedLine, FollowedMode, Follows, Line, Moving, follow_moving};
+use crate::ringdown::moving::{CoursePoint, FollowedLine, FollowedMode, Follows, Moving};
 use crate::statistics::chi_square_tail;
 
 /// A mode that follows laws of its amplitude.
@@ -30,7 +30,15 @@ const ONE_LINE: f64 = 2.5;
 /// Relative distance from a multiple of another line up to which a line is looked at with it.
 const NEAR_MULTIPLE: f64 = 0.02;
 
+/// Variance that the fit leaves round a line, over that of noise, up to which laws stand for it: errors are widened by its
+/// root, and beyond a factor of three are none of noise.
+pub(super) const LARGEST_LACK: f64 = 10.0;
+
+/// Linear modes that may share a line.
+const MOST_IN_ONE_LINE: usize = 3;
+
 /// What was fitted.
+#[derive(Clone, Copy)]
 pub(super) struct LawFit<'a> {
     pub all: &'a ChannelRingdown,
     pub events: &'a [Vec<&'a [f64]>],
@@ -45,21 +53,42 @@ pub(super) struct LawFit<'a> {
 /// # Method
 /// Lines of modes that move, have companions, leave more than noise or lie close together are fitted together, all
 /// other exponentials taken off. A line with laws is one row; an exponential at a multiple of its frequency that falls
-/// with it none; several exponentials that describe a line better than any law are as many rows.
+/// with it none; several exponentials that describe a line better than any law are as many rows. A line that moves and
+/// follows no law is one row as well, a linear mode of its last part. `linear_of`: the linear fit with one mode in place
+/// of pairs.
 /// # Errors
 /// Ended from outside. Where the fit fails the linear one stays.
-pub(super) fn follow_laws(records: &LawFit<'_>, linear: FollowedDecay) -> Result<FollowedDecay, ModelError> {
+pub(super) fn follow_laws(
+    records: &LawFit<'_>,
+    linear: FollowedDecay,
+    linear_of: &dyn Fn(&[(usize, usize)]) -> Result<FollowedDecay, ModelError>,
+) -> Result<FollowedDecay, ModelError> {
     go_on(&records.options.watch)?;
     let given = records.suspects(&linear);
     if given.is_empty() {
         return Ok(linear);
     }
-    let Ok(found) = records.fitted(&given) else { return Ok(linear) };
-    let moves = |line: &FollowedLine| !matches!(line.follows, Follows::Linear | Follows::None);
-    if !found.lines.iter().any(moves) {
-        return Ok(linear);
+    let at = |pole: &c64| nearest(&records.all.poles, *pole).map(|j| (*pole, j));
+    let rows: Vec<(c64, usize)> = linear.whole.poles.iter().filter_map(at).collect();
+    let Ok(found) = Lines::of(records, &given, &rows) else { return Ok(linear) };
+    let refuted = records.moving_without_law(&linear, &found);
+    let one_line: Vec<(usize, usize)> = refuted
+        .iter()
+        .flat_map(|(main, own)| own.iter().filter(move |j| *j != main).map(move |j| (*j, *main)))
+        .collect();
+    let linear = if one_line.is_empty() { linear } else { linear_of(&one_line).unwrap_or(linear) };
+    let mut rows = Rows::of(linear, records.all);
+    for (_, own) in &refuted {
+        rows.widen_line(own);
     }
-    Ok(records.with_rows(linear, &given, found))
+    records.rows(&found, &mut rows);
+    for course in rows.moving() {
+        rows.widen(course.mode, 0.5 * (pole_of(&course.last) - pole_of(&course.first)));
+    }
+    for (mode, range) in rows.ranges() {
+        rows.drop_multiples(mode, range);
+    }
+    Ok(rows.finished(found.fit.residuals))
 }
 
 /// The same where the linear fit has no mode: lines that seem steady may be modes that move. None: they are steady.
@@ -80,8 +109,10 @@ pub(super) fn oscillations(records: &LawFit<'_>) -> Option<FollowedDecay> {
         residuals: Vec::new(),
     };
     let given = records.oscillating();
-    let found = if given.is_empty() { None } else { records.fitted(&given).ok() }?;
-    let followed = records.with_rows(empty, &given, found);
+    let found = if given.is_empty() { None } else { Lines::of(records, &given, &[]).ok() }?;
+    let mut rows = Rows::of(empty, all);
+    records.rows(&found, &mut rows);
+    let followed = rows.finished(found.fit.residuals);
     (!followed.fit.poles.is_empty()).then_some(followed)
 }
 
@@ -132,105 +163,86 @@ impl LawFit<'_> {
     }
 
     /// One turn more or less within the longest record, rad/s.
-    fn resolution(&self) -> f64 {
+    pub fn resolution(&self) -> f64 {
         let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(1);
         TAU / (longest as f64 * self.interval_s)
     }
 
-    /// The lines of these exponentials, the others taken off.
-    fn fitted(&self, given: &[usize]) -> Result<Moving, ModelError> {
-        let all = self.all;
-        let others: Vec<usize> = (0..all.poles.len()).filter(|j| !given.contains(j)).collect();
-        let rest = all.only(&others);
-        let left: Vec<Vec<Vec<f64>>> = self
-            .events
-            .iter()
-            .enumerate()
-            .map(|(event, rows)| {
-                let own = |channel: usize| rest.records.iter().find(|r| r.event == event && r.channel == channel);
-                let mut rows: Vec<Vec<f64>> = rows
-                    .iter()
-                    .enumerate()
-                    .map(|(channel, row)| match own(channel) {
-                        Some(record) if !others.is_empty() => {
-                            let model = rest.ringing(record, self.interval_s, row.len());
-                            row.iter().zip(model).map(|(y, m)| y - m).collect()
-                        }
-                        _ => row.to_vec(),
-                    })
-                    .collect();
-                for (row, gaps) in rows.iter_mut().zip(self.options.missing.get(event).into_iter().flatten()) {
-                    gaps.iter().for_each(|gap| row[gap.clone()].fill(f64::NAN));
-                }
-                rows
-            })
-            .collect();
-        let events: Vec<Vec<&[f64]>> = left.iter().map(|rows| rows.iter().map(|row| &row[..]).collect()).collect();
-        let line = |&j: &usize| Line {
-            poles: vec![Exponential { rate_per_s: -all.poles[j].re, turn_rad_per_s: all.poles[j].im }],
-        };
-        let lines: Vec<Line> = given.iter().map(line).collect();
-        let coloured = all.noise.iter().any(|noise| !noise.is_white());
-        let level = |noise| {
-            let at = |&j: &usize| density(noise, self.interval_s, all.poles[j].im * self.interval_s);
-            given.iter().map(at).fold(0.0, f64::max)
-        };
-        let noise_variance = if coloured { all.noise.iter().map(level).collect() } else { Vec::new() };
-        let options = moving::Options { false_alarm: MOVES, noise_variance, ..moving::Options::default() };
-        follow_moving(&events, self.interval_s, &lines, &options)
-    }
-
     /// The rows of the table as these lines want them.
-    fn with_rows(&self, linear: FollowedDecay, given: &[usize], found: Moving) -> FollowedDecay {
-        let mut rows = Rows::of(linear, self.all);
-        let mut of_line: Vec<Option<usize>> = Vec::new();
-        for line in &found.lines {
-            let own: Vec<usize> = line.given.iter().map(|&number| given[number]).collect();
-            of_line.push(self.rows_of(line, &own, &found, &mut rows));
-        }
-        for line in &found.lines {
-            if let Follows::Multiple { of, multiple } = line.follows {
-                let own: Vec<usize> = line.given.iter().map(|&number| given[number]).collect();
-                if let Some(of) = of_line[of] {
-                    rows.drop_all(&own, Dropped::Harmonic { of, multiple });
-                }
+    fn rows(&self, found: &Lines, rows: &mut Rows<'_>) {
+        let lines = || found.fit.lines.iter().zip(&found.own);
+        let of_line: Vec<Option<usize>> =
+            lines().map(|(line, own)| self.rows_of(line, own, &found.fit, rows)).collect();
+        for (line, own) in lines() {
+            if let Follows::Multiple { of, multiple } = line.follows
+                && let Some(of) = of_line[of]
+            {
+                rows.drop_all(own, Dropped::Harmonic { of, multiple });
             }
         }
-        let others: Vec<usize> = (0..self.all.poles.len()).filter(|j| !given.contains(j)).collect();
-        rows.finished(if others.len() < self.all.poles.len() { found.residuals } else { Vec::new() })
+    }
+
+    /// Lines that follow no law and are no linear modes either, for they move from part to part or need more exponentials
+    /// than modes share a line: the strongest exponential, and all.
+    fn moving_without_law(&self, linear: &FollowedDecay, found: &Lines) -> Vec<(usize, Vec<usize>)> {
+        let energy = energies(self.all);
+        let moves = |own: &[usize]| {
+            linear.course.iter().filter(|course| course.moves).any(|course| {
+                nearest(&self.all.poles, linear.whole.poles[course.mode]).is_some_and(|of| own.contains(&of))
+            })
+        };
+        let mut refuted = Vec::new();
+        for (line, own) in found.fit.lines.iter().zip(&found.own) {
+            if line.follows != Follows::None || law(line).is_some() {
+                continue;
+            }
+            let strongest = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]));
+            if let Some(main) = strongest.filter(|_| moves(own) || own.len() > MOST_IN_ONE_LINE) {
+                refuted.push((main, own.clone()));
+            }
+        }
+        refuted
     }
 
     /// What a line is in the table; the tag of its (first) row.
     fn rows_of(&self, line: &FollowedLine, own: &[usize], found: &Moving, rows: &mut Rows<'_>) -> Option<usize> {
         let has_row = rows.of_poles(own);
+        if let Some(mode) = law(line) {
+            return self.row_of_law(line, mode, own, rows);
+        }
         match line.follows {
-            Follows::Moving | Follows::Beside => {
-                let mode = line.modes.first().filter(|mode| dies(mode))?;
-                let energy = energies(self.all);
-                let strongest = |list: &[usize]| list.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]));
-                let tag = match has_row.first() {
-                    Some(_) => rows.strongest(&has_row),
-                    None => rows.restored(strongest(own)?),
-                };
-                rows.drop_but(own, tag);
-                rows.take_laws(tag, mode, line.lack.factor);
-                let beside = line.modes.get(1).filter(|_| line.follows == Follows::Beside);
-                if let (Some(other), Some(from)) = (beside.filter(|mode| dies(mode)), strongest(own)) {
-                    let tag = rows.restored(from);
-                    rows.take_linear(tag, other, line.lack.factor);
-                }
-                Some(tag)
-            }
             Follows::Exponentials(count) if line.lack.factor <= 1.0 && count == own.len() => {
                 own.iter().for_each(|&j| rows.undrop_companion(j));
                 rows.of_poles(own).first().copied()
             }
-            Follows::Linear if has_row.len() == 1 && self.by_chance(line, found) => {
+            Follows::Linear if has_row.len() == 1 && (self.by_chance(line, found) || !line.modes.iter().all(rings)) => {
                 rows.drop_all(own, Dropped::Undetermined);
                 None
             }
             _ => has_row.first().copied(),
         }
+    }
+
+    /// The row of a line with laws; its tag.
+    fn row_of_law(
+        &self,
+        line: &FollowedLine,
+        mode: &FollowedMode,
+        own: &[usize],
+        rows: &mut Rows<'_>,
+    ) -> Option<usize> {
+        let energy = energies(self.all);
+        let strongest = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]))?;
+        let has_row = rows.of_poles(own);
+        let tag = if has_row.is_empty() { rows.restored(strongest) } else { rows.strongest(&has_row) };
+        rows.drop_but(own, tag);
+        rows.take_laws(tag, mode, line.lack.factor);
+        let beside = line.modes.get(1).filter(|other| line.follows == Follows::Beside && rings(other));
+        if let Some(other) = beside {
+            let tag = rows.restored(strongest);
+            rows.take_linear(tag, other, line.lack.factor);
+        }
+        Some(tag)
     }
 
     /// Whether noise alone makes a mode of that energy somewhere.
@@ -246,20 +258,31 @@ impl LawFit<'_> {
     }
 }
 
-/// Whether two lines are within so many half widths of both.
-///
-/// `resolution`: rad/s that the records tell apart; what is nearer is one line.
-fn near(a: c64, b: c64, widths: f64, resolution: f64) -> bool {
-    (a.im - b.im).abs() < (widths * (a.re.abs() + b.re.abs())).max(resolution)
-}
-
 /// Whether a line is about a multiple of another, which may move.
 fn near_multiple(line: c64, of: c64, multiple: f64) -> bool {
     let widths = ONE_LINE * (line.re.abs() + multiple * of.re.abs());
     (line.im - multiple * of.im).abs() < widths.max(NEAR_MULTIPLE * line.im)
 }
 
+/// The mode of a line that follows laws, closely enough to stand for it.
+fn law(line: &FollowedLine) -> Option<&FollowedMode> {
+    let mode = line.modes.first()?;
+    let moves = mode.damping_terms.len() + mode.frequency_terms.len() > 2;
+    let stands = match line.follows {
+        Follows::Moving | Follows::Beside => true,
+        Follows::None => moves && line.lack.factor < LARGEST_LACK,
+        _ => false,
+    };
+    (stands && dies(mode)).then_some(mode)
+}
+
 /// Whether a mode's damping is above zero somewhere along its amplitude.
-fn dies(mode: &FollowedMode) -> bool {
+pub(super) fn dies(mode: &FollowedMode) -> bool {
     mode.course.iter().any(|at| at.damping_ratio.value > DETERMINED * at.damping_ratio.std)
+}
+
+/// Whether a mode's damping is above zero and below that of a response without a maximum.
+fn rings(mode: &FollowedMode) -> bool {
+    let below = |at: &CoursePoint| at.damping_ratio.value + DETERMINED * at.damping_ratio.std < FRAC_1_SQRT_2;
+    dies(mode) && mode.course.iter().all(below)
 }

@@ -4,7 +4,7 @@
 //! projection (amplitudes solved for), fit (the search on poles), noise (of each channel), levels (of what
 //! is left round a line), bank (where another mode may be), order
 //! (how many there are), shape (rank-one residues), result,
-//! companions (what is no mode), course (whether modes move: [`follow_channels`]), laws (those that follow laws of their
+//! companions (what is no mode), course (whether modes move: [`follow_channels`]), lines and laws (those that follow laws of their
 //! amplitude), systems (whether all hits are of one:
 //! [`hit_systems`]).
 
@@ -16,7 +16,10 @@ mod course;
 mod course_tests;
 mod fit;
 mod laws;
+#[cfg(test)]
+mod laws_tests;
 mod levels;
+mod lines;
 mod noise;
 mod options;
 mod order;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use faer::{Mat, c64};
 
 use super::companions::{Dropped, DroppedMode, energies};
-use super::course::{FollowedDecay, nearest};
+use super::course::{FollowedDecay, ModeCourse, nearest};
 use super::laws::AmplitudeCourse;
 use super::result::ChannelRingdown;
 use super::shape::ShapePoint;
@@ -136,6 +136,67 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Errors of a mode that moves without a law count half of what it moves, rad/s: the value at the smallest amplitude lies
+    /// beyond that of the last part.
+    pub fn widen(&mut self, tag: usize, half: c64) {
+        let Some(at) = self.place(tag) else { return };
+        let half = [half.re, half.im];
+        for a in 0..2 {
+            for b in 0..2 {
+                self.followed.fit.covariance[(2 * at + a, 2 * at + b)] += half[a] * half[b];
+            }
+        }
+    }
+
+    /// The same of a line of several exponentials that no law describes: half of what they span. It is said to move.
+    pub fn widen_line(&mut self, own: &[usize]) {
+        let Some(tag) = self.of_poles(own).first().copied() else { return };
+        let span = |part: fn(&c64) -> f64| {
+            let values = || own.iter().map(|&j| part(&self.all.poles[j]));
+            values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+        };
+        self.widen(tag, c64::new(0.5 * span(|s| s.re), 0.5 * span(|s| s.im)));
+        self.followed.course.iter_mut().filter(|course| course.mode == tag).for_each(|course| course.moves = true);
+    }
+
+    /// Modes that move from part to part.
+    pub fn moving(&self) -> Vec<ModeCourse> {
+        self.followed.course.iter().filter(|course| course.moves).copied().collect()
+    }
+
+    /// Modes that move, by tag, with the least and the largest angular frequency that they pass through.
+    pub fn ranges(&self) -> Vec<(usize, [f64; 2])> {
+        let course = self.followed.course.iter().filter(|course| course.moves);
+        let parts = course.map(|course| (course.mode, vec![pole_of(&course.first).im, pole_of(&course.last).im]));
+        let along = self.followed.along.iter().map(|along| {
+            let turns = along.laws.course.iter().map(|at| TAU * at.frequency_hz.value).collect();
+            (along.mode, turns)
+        });
+        let range = |turns: Vec<f64>| {
+            [turns.iter().copied().fold(f64::MAX, f64::min), turns.into_iter().fold(f64::MIN, f64::max)]
+        };
+        parts.chain(along).map(|(tag, turns)| (tag, range(turns))).collect()
+    }
+
+    /// Weak rows at a multiple of a mode that moves, anywhere in the range that it passes through, are none.
+    pub fn drop_multiples(&mut self, of: usize, [low, high]: [f64; 2]) {
+        let Some(main) = self.place(of) else { return };
+        let fit = &self.followed.whole;
+        let energy = energies(fit);
+        let is_one = |at: usize, multiple: f64| {
+            let width = fit.poles[at].re.abs();
+            let range = multiple * low - width..multiple * high + width;
+            energy[at] < WEAK_MULTIPLE * energy[main] && range.contains(&fit.poles[at].im)
+        };
+        let found: Vec<(usize, usize)> = (0..self.tags.len())
+            .filter(|at| *at != main)
+            .filter_map(|at| (2..=3).find(|n| is_one(at, *n as f64)).map(|n| (self.tags[at], n)))
+            .collect();
+        for (tag, multiple) in found {
+            self.drop_row(tag, Dropped::Harmonic { of, multiple });
+        }
+    }
+
     /// Rows ascending, numbers instead of tags.
     pub fn finished(mut self, residuals: Vec<Vec<Vec<f64>>>) -> FollowedDecay {
         let mut order: Vec<usize> = (0..self.tags.len()).collect();
@@ -154,7 +215,8 @@ impl<'a> Rows<'a> {
         self.followed.along.sort_by_key(|along| along.mode);
         self.followed.fit = self.followed.fit.chosen(&order);
         self.followed.whole = self.followed.whole.chosen(&order);
-        self.followed.residuals = residuals;
+        // without a law the linear fit is what was fitted
+        self.followed.residuals = if self.followed.along.is_empty() { Vec::new() } else { residuals };
         self.followed
     }
 }
@@ -223,11 +285,13 @@ impl ChannelRingdown {
     }
 }
 
+/// Energy of a multiple over that of its mode, at most: 15 % of the amplitude, as of weak nonlinearity.
+const WEAK_MULTIPLE: f64 = 0.0225;
 /// Damping ratio of a row, at least: nothing rings for longer than a hundred million periods.
 const LEAST_RATIO: f64 = 1e-9;
 
 /// Pole of a mode, rad/s.
-fn pole_of(mode: &ModeEstimate) -> c64 {
+pub(super) fn pole_of(mode: &ModeEstimate) -> c64 {
     let (omega, ratio) = (TAU * mode.frequency_hz.value, mode.damping_ratio().value);
     c64::new(-ratio * omega, omega * (1.0 - ratio * ratio).max(0.0).sqrt())
 }
