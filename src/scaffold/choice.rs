@@ -207,6 +207,25 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
     Ok(Choice::of(goal, vec![channel], why))
 }
 
+/// Whether noise in any of the signals has a resonance in it.
+fn resonates(signals: &[Vec<f64>]) -> bool {
+    signals.iter().any(|values| shows_resonance(values, segment_samples(values.len())))
+}
+
+/// That several sensors move at random with no measured force.
+fn several_in_noise(source: &Source, channels: &[&Channel]) -> Question {
+    let (file, count) = (source.file.display(), channels.len());
+    let problem = format!(
+        "{file}: {count} sensors of a stationary random vibration and no measured force: no free decays, and the stage for \
+         modes under unmeasured forces is yet to come"
+    );
+    let help = format!(
+        "--goal thermal --channel {} fits the resonance in one sensor's spectrum; --input NAME names a measured force",
+        channels[0].location
+    );
+    (problem, Some(help))
+}
+
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
     if wanted.records_are == Some(RecordsAre::Points) {
         let help =
@@ -233,9 +252,6 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
     let record = source.name();
     let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
     let why = match (found.decays.first(), found.reason()) {
-        (Some(_), _) if guessed && found.random => {
-            return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
-        }
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
@@ -244,15 +260,21 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())
         }
         (None, Some(reason)) if guessed && !found.steady.is_empty() && is_tone(&values[0]) => {
-            return other(Goal::Steady, format!("{record}: {reason}"));
+            let said = found.steady.first().map_or(reason, |steady| steady.statement());
+            return other(Goal::Steady, format!("{record}: {said}"));
         }
-        (None, Some(_)) if guessed && shows_resonance(&values[0], segment_samples(values[0].len())) => {
-            return other(Goal::Thermal, format!("{record}: noise with a resonance in it"));
+        (None, Some(reason)) if guessed && (found.random || resonates(&values)) => {
+            if channels.len() > 1 {
+                return Err(several_in_noise(source, &channels));
+            }
+            let reason = if found.random { reason } else { "noise with a resonance in it".to_owned() };
+            return other(Goal::Thermal, format!("{record}: {reason}"));
         }
         (None, Some(reason)) if guessed => {
+            let none = format!("{reason}; no steady oscillation and no resonance in noise either");
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
             let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
-            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help)));
+            return Err((format!("{}: no free decay, {none}", source.file.display()), Some(help)));
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };

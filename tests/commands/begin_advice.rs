@@ -242,3 +242,56 @@ fn a_unit_over_that_of_a_force_is_a_frequency_response_s() {
     let text = std::fs::read_to_string(here.join("t.toml")).unwrap_or_default();
     assert!(!text.contains("io.frf"), "{text}");
 }
+
+/// Motion of an oscillator that white noise drives, of variance 1: `turn` rad a sample.
+fn driven_by_noise(turn: f64, quality: f64, force: &[f64]) -> Vec<f64> {
+    let fall = (-0.5 * turn / quality).exp();
+    let [mut last, mut before] = [0.0; 2];
+    let next = |force: &f64| {
+        let next = 2.0 * fall * turn.cos() * last - fall * fall * before + force;
+        (before, last) = (last, next);
+        next
+    };
+    let moved: Vec<f64> = force.iter().map(next).collect();
+    let rms = (moved.iter().map(|y| y * y).sum::<f64>() / moved.len() as f64).sqrt();
+    moved.iter().map(|y| y / rms).collect()
+}
+
+#[test]
+fn what_is_stationary_is_no_decay_and_its_kind_is_said() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    let samples = 40_000;
+    let sum = |parts: [(f64, &[f64]); 3]| -> Vec<f64> {
+        (0..samples).map(|k| parts.iter().map(|(weight, part)| weight * part[k]).sum()).collect()
+    };
+    for (seed, turn, quality) in [(11, 0.88, 60.0), (12, 0.3, 150.0), (13, 1.4, 600.0)] {
+        let [force, other, e] = [0, 1, 2].map(|part| noise(100 * seed + part, samples));
+        let (one, two) = (driven_by_noise(turn, quality, &force), driven_by_noise(0.55 * turn, 80.0, &other));
+        let tone: Vec<f64> = (0..samples).map(|k| (turn * k as f64).sin() + 0.1 * e[k]).collect();
+        let mut place = 0.0;
+        let walk = |e: &f64| {
+            place += e;
+            place
+        };
+        let walk: Vec<f64> = e.iter().map(walk).collect();
+        table(here, "thermal.csv", "Time (s),x (V)", even, &[sum([(1.0, &one), (0.0, &two), (0.2, &e)])]);
+        table(here, "tone.csv", "Time (s),x (V)", even, &[tone]);
+        table(here, "walk.csv", "Time (s),x (V)", even, &[walk]);
+        let sensors = [(1.0, 0.5), (0.7, -0.6), (0.3, 0.9)].map(|(a, b)| sum([(a, &one), (b, &two), (0.1, &e)]));
+        table(here, "ambient.csv", "Time (s),acc1 (m/s^2),acc2 (m/s^2),acc3 (m/s^2)", even, &sensors);
+        for (name, goal) in [("thermal", "thermal"), ("tone", "steady")] {
+            let file = format!("{name}.csv");
+            let [stdout, _] = said(here, &["new", "pipeline", &file, "-o", &format!("{name}.toml"), "--json"]);
+            assert!(stdout.contains(&format!("\"goal\": \"{goal}\"")), "{name}, Q {quality}: {stdout}");
+        }
+        let stderr = refused(here, &["new", "pipeline", "walk.csv", "-o", "walk.toml"]);
+        assert!(stderr.contains("no steady oscillation and no resonance"), "{stderr}");
+        let stderr = refused(here, &["new", "pipeline", "ambient.csv", "-o", "ambient.toml"]);
+        assert!(stderr.contains("3 sensors of a stationary random vibration"), "Q {quality}: {stderr}");
+        // who says decay is told what it is
+        said(here, &["new", "pipeline", "thermal.csv", "--goal", "decay", "-o", "decay.toml"]);
+        let stderr = refused(here, &["run", "decay.toml", "-o", "decay.h5", "--cache", "cache"]);
+        assert!(stderr.contains("no free decay") && stderr.contains("--goal thermal"), "Q {quality}: {stderr}");
+    }
+}

@@ -83,7 +83,7 @@ pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
 pub use presence::Presence;
 pub use ratio::{EndTreatment, EtfeSettings, TransferEstimate, difference, etfe};
-pub use resonance::shows_resonance;
+pub use resonance::{FALSE_ALARM as RESONANCE_FALSE_ALARM, resonance_chance, shows_resonance};
 pub use seen_oscillator::SeenThrough;
 pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};
 pub use thermal_peak::{PeakSearch, thermal_peak};
