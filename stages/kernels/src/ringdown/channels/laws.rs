@@ -87,6 +87,14 @@ pub(super) fn follow_laws(
     }
     for (mode, range) in rows.ranges() {
         rows.drop_multiples(mode, range);
+        if found
+            .fit
+            .lines
+            .iter()
+            .all(|line| line.follows != Follows::Beside && !matches!(line.follows, Follows::Exponentials(_)))
+        {
+            rows.drop_within(mode, range);
+        }
     }
     Ok(rows.finished(found.fit.residuals))
 }

@@ -148,14 +148,17 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The same of a line of several exponentials that no law describes: half of what they span. It is said to move.
+    /// The same of a line of several exponentials that no law describes: how far they lie from the row, weighted with their
+    /// energy. It is said to move.
     pub fn widen_line(&mut self, own: &[usize]) {
         let Some(tag) = self.of_poles(own).first().copied() else { return };
-        let span = |part: fn(&c64) -> f64| {
-            let values = || own.iter().map(|&j| part(&self.all.poles[j]));
-            values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
+        let Some(row) = self.place(tag).map(|at| self.followed.fit.poles[at]) else { return };
+        let energy = energies(self.all);
+        let sum: f64 = own.iter().map(|&j| energy[j]).sum::<f64>().max(f64::MIN_POSITIVE);
+        let apart = |part: fn(c64) -> f64| {
+            (own.iter().map(|&j| energy[j] * part(self.all.poles[j] - row).powi(2)).sum::<f64>() / sum).sqrt()
         };
-        self.widen(tag, c64::new(0.5 * span(|s| s.re), 0.5 * span(|s| s.im)));
+        self.widen(tag, c64::new(apart(|s| s.re), apart(|s| s.im)));
         self.followed.course.iter_mut().filter(|course| course.mode == tag).for_each(|course| course.moves = true);
     }
 
@@ -176,6 +179,25 @@ impl<'a> Rows<'a> {
             [turns.iter().copied().fold(f64::MAX, f64::min), turns.into_iter().fold(f64::MIN, f64::max)]
         };
         parts.chain(along).map(|(tag, turns)| (tag, range(turns))).collect()
+    }
+
+    /// Weaker rows within the range that a mode with laws passes through, of lines without: what its motion left.
+    pub fn drop_within(&mut self, of: usize, [low, high]: [f64; 2]) {
+        let Some(main) = self.place(of) else { return };
+        let energy = energies(&self.followed.whole);
+        let width = self.followed.fit.poles[main].re.abs();
+        let lawless = |tag: usize| self.followed.along.iter().all(|along| along.mode != tag);
+        if lawless(of) {
+            return;
+        }
+        let is_one = |at: &usize| {
+            let inside = (low - width..high + width).contains(&self.followed.fit.poles[*at].im);
+            *at != main && inside && energy[*at] < energy[main] && lawless(self.tags[*at])
+        };
+        let found: Vec<usize> = (0..self.tags.len()).filter(is_one).map(|at| self.tags[at]).collect();
+        for tag in found {
+            self.drop_row(tag, Dropped::Companion { of, mac: 1.0 });
+        }
     }
 
     /// Weak rows at a multiple of a mode that moves, anywhere in the range that it passes through, are none.
