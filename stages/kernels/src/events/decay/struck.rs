@@ -27,6 +27,11 @@ const FALSE_ALARM: f64 = 1e-4;
 const LEAST_CHANGE: f64 = 0.05;
 /// Blocks that a glitch spoils at most: a wrong sample and its edges.
 const GLITCH_BLOCKS: usize = 3;
+/// Blocks before and from a hit on that are compared: a period and a half.
+const RISE_BLOCKS: usize = 24;
+/// Ratio of the rms from which on the ringing rises, and of that of its second differences, which noise alone has once in
+/// a hundred windows.
+const RISES: (f64, f64) = (1.1, 1.5);
 /// Periods within which failures are those of one hit.
 const ONE_HIT_PERIODS: usize = 2;
 /// Standard deviation of a normal variable over the median of its modulus.
@@ -50,7 +55,8 @@ pub(super) struct Failures {
 /// Means of blocks of a sixteenth of a period. Each channel's forward recurrence by least squares over windows of up to
 /// 4,096 blocks, refitted without the blocks that miss. The squares of the channels' misses over their scale around that
 /// instant, added, are chi-square; a hit exceeds what noise does in one record of ten thousand, and a twentieth of the
-/// ringing. Misses that a few wrong blocks explain are a glitch's: the ringing goes on after them as it was.
+/// ringing, and raises it or its higher modes. Misses that a few wrong blocks explain are a glitch's: the ringing goes on
+/// after them as it was.
 /// # Cost
 /// 500 operations per block and channel and fit.
 pub(super) fn hits_into_ringing(
@@ -99,8 +105,10 @@ fn failures(lanes: &[Lane], limit: f64) -> Vec<(usize, bool)> {
             let reach = b..(b + first.order + GLITCH_BLOCKS).min(first.means.len());
             let least = |lane: &Lane| (LEAST_CHANGE * lane.rms_around(b)).max(lane.rounding);
             let large = lanes.iter().any(|lane| lane.largest(reach.clone()) > least(lane));
-            if large {
-                all.push((b, !is_glitch(lanes, reach.clone(), limit)));
+            let glitch = large && is_glitch(lanes, reach.clone(), limit);
+            // a system that moves with its amplitude is foretold badly too, and goes on to fall
+            if glitch || large && lanes.iter().any(|lane| lane.rises(b)) {
+                all.push((b, !glitch));
             }
             // the misses of one event reach as far as the recurrence
             b = reach.end;
@@ -204,6 +212,19 @@ impl Lane {
 
     fn largest(&self, blocks: Range<usize>) -> f64 {
         self.misses[blocks].iter().filter(|miss| miss.is_finite()).fold(0.0, |m, miss| m.max(miss.abs()))
+    }
+
+    /// Whether there is more ringing from a block on than before, as a whole or of its higher modes.
+    fn rises(&self, b: usize) -> bool {
+        let Some(first) = b.checked_sub(RISE_BLOCKS) else { return false };
+        let Some(window) = self.means.get(first..b + RISE_BLOCKS) else { return false };
+        let (before, after) = window.split_at(RISE_BLOCKS);
+        let rms = |values: &[f64]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            (values.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+        };
+        let bends = |values: &[f64]| -> Vec<f64> { values.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]).collect() };
+        rms(after) > RISES.0 * rms(before) || rms(&bends(after)) > RISES.1 * rms(&bends(before))
     }
 
     fn rms_around(&self, b: usize) -> f64 {
