@@ -25,7 +25,7 @@ mod tests {
 
     use afmid_pipeline::{Array, Axis, Context, Port, Ports, Stage};
 
-    use crate::model::{Pem, Subspace};
+    use crate::model::{Pem, SubspaceEstimate};
 
     const PAIR: Port<Array> = Port::new("pair", "pair", "input and output");
 
@@ -55,7 +55,7 @@ mod tests {
             let wanted = format!("the input is a sine of {:.6} Hz", 200.0 * cycles);
             let refused = pem.run(&pair(cycles, 0.0), &Context::alone(0)).unwrap_err().problem;
             assert!(refused.starts_with(&wanted), "{refused}");
-            let refused = Subspace::default().run(&pair(cycles, 0.0), &Context::alone(0)).unwrap_err().problem;
+            let refused = SubspaceEstimate::default().run(&pair(cycles, 0.0), &Context::alone(0)).unwrap_err().problem;
             assert!(refused.starts_with(&wanted), "{refused}");
             assert!(pem.run(&pair(cycles, 0.5), &Context::alone(0)).is_ok());
         }
