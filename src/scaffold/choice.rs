@@ -1,7 +1,7 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::harmonics::is_tone;
-use afmid_kernels::spectra::{is_impulsive, rings_on, shows_resonance};
+use afmid_kernels::spectra::{is_impulsive, shows_resonance};
 use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
@@ -136,13 +136,6 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let best = source.best.and_then(|index| source.channels.get(index));
     let best = best.filter(|best| found.iter().any(|channel| channel.location == best.location));
     let outputs = if wanted.channels.is_empty() { like(&found, best.unwrap_or(found[0]), file) } else { found };
-    if goal.is_none()
-        && struck
-        && records_are.is_none()
-        && let Some(choice) = rings_into_the_next(file, wanted, inputs[0], &outputs)?
-    {
-        return Ok(choice);
-    }
     let several = struck || records_are.is_some() || outputs.len() > 1;
     let goal = goal.unwrap_or(if several { Goal::Frf } else { Goal::InputOutput });
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
@@ -164,37 +157,6 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
 }
 
-/// Free decays where a structure still rings when a hit's block ends: responses by blocks would be of more than the block.
-fn rings_into_the_next<'a>(
-    file: &FirstFile<'a>,
-    wanted: &Wanted<'_>,
-    force: &Channel,
-    outputs: &[&'a Channel],
-) -> Result<Option<Choice<'a>>, Question> {
-    let values = outputs.iter().map(|channel| file.samples(channel)).collect::<Result<Vec<_>, _>>()?;
-    let rows: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-    let Some(share) = rings_on(&file.samples(force)?, &rows) else { return Ok(None) };
-    let (_, found) = file.search(outputs, wanted)?;
-    if found.decays.is_empty() {
-        return Ok(None);
-    }
-    let decays = match found.decays.len() {
-        1 => "a free decay".to_owned(),
-        count => format!("{count} free decays"),
-    };
-    let names: Vec<&str> = outputs.iter().map(|channel| channel.location.as_str()).collect();
-    let why = format!(
-        "{} of {} in {}: {:.0} % of the amplitude is left where the next hit or the end comes, which frequency responses \
-         by blocks do not bear; --goal frf makes them all the same, --goal input-output fits {} to one of them",
-        decays,
-        names.join(", "),
-        file.source.name(),
-        100.0 * share,
-        force.location
-    );
-    Ok(Some(Choice::of(Goal::Decay, outputs.to_vec(), why)))
-}
-
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
     let channel = match wanted.channels {
         [] => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| nothing(source))?,
@@ -205,25 +167,6 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
         }
     };
     Ok(Choice::of(goal, vec![channel], why))
-}
-
-/// Whether noise in any of the signals has a resonance in it.
-fn resonates(signals: &[Vec<f64>]) -> bool {
-    signals.iter().any(|values| shows_resonance(values, segment_samples(values.len())))
-}
-
-/// That several sensors move at random with no measured force.
-fn several_in_noise(source: &Source, channels: &[&Channel]) -> Question {
-    let (file, count) = (source.file.display(), channels.len());
-    let problem = format!(
-        "{file}: {count} sensors of a stationary random vibration and no measured force: no free decays, and the stage for \
-         modes under unmeasured forces is yet to come"
-    );
-    let help = format!(
-        "--goal thermal --channel {} fits the resonance in one sensor's spectrum; --input NAME names a measured force",
-        channels[0].location
-    );
-    (problem, Some(help))
 }
 
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
@@ -252,6 +195,9 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
     let record = source.name();
     let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
     let why = match (found.decays.first(), found.reason()) {
+        (Some(_), _) if guessed && found.random => {
+            return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
+        }
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
@@ -260,21 +206,15 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())
         }
         (None, Some(reason)) if guessed && !found.steady.is_empty() && is_tone(&values[0]) => {
-            let said = found.steady.first().map_or(reason, |steady| steady.statement());
-            return other(Goal::Steady, format!("{record}: {said}"));
+            return other(Goal::Steady, format!("{record}: {reason}"));
         }
-        (None, Some(reason)) if guessed && (found.random || resonates(&values)) => {
-            if channels.len() > 1 {
-                return Err(several_in_noise(source, &channels));
-            }
-            let reason = if found.random { reason } else { "noise with a resonance in it".to_owned() };
-            return other(Goal::Thermal, format!("{record}: {reason}"));
+        (None, Some(_)) if guessed && shows_resonance(&values[0], segment_samples(values[0].len())) => {
+            return other(Goal::Thermal, format!("{record}: noise with a resonance in it"));
         }
         (None, Some(reason)) if guessed => {
-            let none = format!("{reason}; no steady oscillation and no resonance in noise either");
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
             let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
-            return Err((format!("{}: no free decay, {none}", source.file.display()), Some(help)));
+            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help)));
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };

@@ -118,7 +118,7 @@ impl<'a> FirstFile<'a> {
         let Ok(values) = self.samples(channel) else { return false };
         let rate = channel.sample_rate_hz.unwrap_or(1.0);
         let found = find_decays(&[&values], rate, &DecaySearchOptions::default());
-        found.is_ok_and(|found| !found.decays.is_empty())
+        found.is_ok_and(|found| !found.random && !found.decays.is_empty())
     }
 
     /// That the rate which the user gives is not that of the times beside a channel.

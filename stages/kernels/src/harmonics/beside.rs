@@ -51,7 +51,8 @@ pub fn find_decays_beside_lines(
         multiple.round() >= 1.0 && (multiple - multiple.round()).abs() < OWN * multiple
     };
     let large = |peak: f64| peak.abs() >= LEAST_PEAK * largest;
-    let beside = !second.decays.is_empty()
+    let beside = !second.random
+        && !second.decays.is_empty()
         && second
             .decays
             .iter()

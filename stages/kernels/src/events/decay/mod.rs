@@ -36,24 +36,17 @@ mod clipping;
 mod drive;
 mod envelope;
 mod error;
-mod excursion;
 mod extent;
 mod found;
 mod noise_floor;
-#[cfg(test)]
-mod noise_tests;
 mod onsets;
 mod options;
-mod random;
 mod search;
 #[cfg(test)]
 mod search_tests;
 #[cfg(test)]
 mod simulated;
 mod steadiness;
-mod struck;
-#[cfg(test)]
-mod struck_tests;
 #[cfg(test)]
 mod tests;
 

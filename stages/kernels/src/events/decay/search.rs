@@ -11,20 +11,21 @@ use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay,
 use super::noise_floor::noise_std;
 use super::onsets::{QUIET, QUIET_PERIODS, onsets};
 use super::options::{DecaySearchOptions, DecayTrigger};
-use super::steadiness::{SEGMENT_PERIODS, oscillation};
-use super::struck::{Failures, hits_into_ringing};
+use super::steadiness::oscillation;
 use crate::events::baseline;
 use crate::signal::code_step;
 
 /// Least samples of a record.
 const LEAST_SAMPLES: usize = 64;
-/// Share of a period before the next event that is left out. Why: a hit is seen a sample or two after its contact begins,
-/// and a converter's filter of linear phase answers some samples before it.
-const BEFORE_EVENT: f64 = 0.5;
 /// Periods of a decay at least.
 const LEAST_PERIODS: usize = 2;
 /// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
 const CERTAIN_FALL: f64 = 1.5;
+/// Rises, steady ones among them, that may be those of a random vibration. Why: fewer do not know a fourth moment.
+const RANDOM_RISES: usize = 10;
+/// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
+/// independent samples, of which ten rises have some; the narrower the band, the more.
+const RANDOM_KURTOSIS: f64 = 0.5;
 /// A sixteenth of a driven stretch is left out at its end: to so much a bend is known.
 const END: usize = 16;
 /// Change of the amplitude, nepers, below which a stretch may be a drive's. Why: of few segments a slope's error would
@@ -41,14 +42,11 @@ const LEAST_FALL: f64 = 1e-3;
 /// # Method
 /// 1. The strongest oscillation sets the period. Each channel less its running mean over two periods, over its noise
 ///    (quietest stretches), squared and added: the envelope.
-/// 2. Starts by [`DecayTrigger`]; refined to the first sustained departure from the quiet line before. Hits into ringing:
-///    where its prediction fails.
+/// 2. Starts by [`DecayTrigger`]; refined to the first sustained departure from the quiet line before.
 /// 3. End: where the ringing of two periods is smaller than the noise, or the next start.
 /// 4. First free sample: the later samples foretell it backwards by a linear recurrence; contact and saturation do not
 ///    obey it.
 /// 5. The decline of the strongest oscillation against its own error: what does not decline is [`Steady`].
-/// 6. Its size against the excursions of stationary noise with the same mean energy in its band: what is no larger is
-///    none.
 /// # Shapes
 /// `channels`: C slices of N samples of the same instants.
 /// # Units
@@ -86,32 +84,28 @@ pub fn find_decays(
         let next = starts.get(place + 1).copied().unwrap_or(record.envelope.samples());
         since = record.judge(onset, since, next, options, &mut found);
     }
-    if matches!(options.trigger, DecayTrigger::LargestRise) {
-        record.dismiss_excursions(&mut found);
-    }
+    found.random = record.is_random(&found);
     record.keep_largest(&mut found.decays, options.most);
     Ok(found)
 }
 
 /// A record as the search sees it.
-pub(super) struct Record<'a> {
+struct Record<'a> {
     /// Without the drive's.
-    pub(super) channels: Vec<&'a [f64]>,
+    channels: Vec<&'a [f64]>,
     numbers: Vec<usize>,
     drive: Option<&'a [f64]>,
     /// Channels without their drift.
-    pub(super) swings: Vec<Vec<f64>>,
+    swings: Vec<Vec<f64>>,
     /// Infinite for a channel that never changes: it takes no part.
-    pub(super) noise_std: Vec<f64>,
-    /// Steps of the codes; 0 where there are none.
-    steps: Vec<f64>,
+    noise_std: Vec<f64>,
     clipped: Vec<Vec<Range<usize>>>,
     envelope: Envelope,
     /// Where a steady response begins to die.
     response_ends: Vec<usize>,
     /// Strongest oscillation, cycles per sample.
     frequency: f64,
-    pub(super) rate_hz: f64,
+    rate_hz: f64,
     all: Vec<&'a [f64]>,
 }
 
@@ -143,7 +137,6 @@ impl<'a> Record<'a> {
             drive,
             swings,
             noise_std,
-            steps,
             clipped,
             response_ends: ends_of_response(&envelope),
             envelope,
@@ -164,7 +157,7 @@ impl<'a> Record<'a> {
             }
             (DecayTrigger::DriveEnd { .. }, None) => self.response_ends.clone(),
             (DecayTrigger::LargestRise, _) => {
-                self.with_hits(self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options)))
+                self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options))
             }
             _ => onsets(&self.all, &self.envelope, self.rate_hz, options),
         }
@@ -181,10 +174,7 @@ impl<'a> Record<'a> {
             let quiet = start < QUIET_PERIODS * period
                 || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < QUIET;
             let (end, _) = end(&self.envelope, start, next);
-            // a beat may dip below the noise: it rises no higher than its decay began
-            let lower = place > 0 && self.height(start) < self.height(starts[place - 1]);
-            let foretold = (!quiet || lower) && self.begin(start, end).foretold;
-            if foretold || (!quiet && self.is_late_beat(&starts[..=place])) {
+            if !quiet && (self.begin(start, end).foretold || self.is_late_beat(&starts[..=place])) {
                 starts.remove(place);
             } else {
                 next = start;
@@ -193,46 +183,13 @@ impl<'a> Record<'a> {
         starts
     }
 
-    /// Adds hits into the ringing of earlier ones, places those among the rises that are such, and leaves out glitches.
-    fn with_hits(&self, starts: Vec<usize>) -> Vec<usize> {
-        let apart = LEAST_PERIODS * self.envelope.period;
-        let mut all = Vec::with_capacity(starts.len());
-        let mut since = 0;
-        while let Some(&start) = starts.get(since) {
-            // through all rises that come before it has died
-            let mut last = since;
-            let until = loop {
-                let next = starts.get(last + 1).copied();
-                match end(&self.envelope, starts[last], next.unwrap_or(self.envelope.samples())) {
-                    (_, DecayEnd::NextEvent) if next.is_some() => last += 1,
-                    (end, _) => break end,
-                }
-            };
-            let ringing = (start + apart).min(until)..until;
-            let Failures { hits, glitches } =
-                hits_into_ringing(&self.channels, &self.steps, &self.clipped, &ringing, self.envelope.period);
-            let rises = &starts[since + 1..=last];
-            let far = |from: &[usize], rise: usize| from.iter().all(|one| one.abs_diff(rise) > apart);
-            let placed = |rise: &&usize| far(&hits, **rise) && far(&glitches, **rise);
-            all.push(start);
-            all.extend(rises.iter().filter(placed));
-            all.extend(hits.iter().filter(|hit| **hit + apart < until));
-            since = last + 1;
-        }
-        all.sort_unstable();
-        all
-    }
-
     /// Whether the last of the starts is too late in the record for what follows to foretell anything, and no higher
     /// than the one before it: a beat rises no higher than its decay began.
     fn is_late_beat(&self, starts: &[usize]) -> bool {
         let [.., before, last] = *starts else { return false };
-        last + LEAST_PERIODS * self.envelope.period > self.envelope.samples() && self.height(last) < self.height(before)
-    }
-
-    /// Largest energy within the first periods.
-    fn height(&self, start: usize) -> f64 {
-        self.envelope.largest(start, start + LEAST_PERIODS * self.envelope.period)
+        let span = LEAST_PERIODS * self.envelope.period;
+        let height = |start: usize| self.envelope.largest(start, start + span);
+        last + span > self.envelope.samples() && height(last) < height(before)
     }
 
     fn begin(&self, onset: usize, end: usize) -> Begin {
@@ -256,8 +213,6 @@ impl<'a> Record<'a> {
             _ => start,
         };
         let (end, why) = end(&self.envelope, onset, next);
-        let before = (BEFORE_EVENT * period as f64).ceil() as usize;
-        let end = if why == DecayEnd::NextEvent && !given { end - before.min(end - onset) } else { end };
         let driven = if given { None } else { self.driven_until(onset, end, options, found) };
         let onset = driven.unwrap_or(onset);
         let first = match options.trigger {
@@ -272,13 +227,7 @@ impl<'a> Record<'a> {
             return end;
         }
         let range = first..end;
-        let seen =
-            |periods: f64| oscillation(&self.channels, &self.noise_std, &range, self.frequency, periods, self.rate_hz);
-        let mut tone = seen(SEGMENT_PERIODS);
-        if !tone.decline.std_per_s.is_finite() && why != DecayEnd::Noise {
-            // up to the next hit few periods are all there is
-            tone.decline = seen(LEAST_PERIODS as f64).decline;
-        }
+        let mut tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
         // what does not turn twice is a relaxation
         if tone.frequency * (range.len() as f64) < LEAST_PERIODS as f64 {
             found.dismissed.push(DismissedDecay { onset, reason: DismissedReason::TooShort });
@@ -318,8 +267,7 @@ impl<'a> Record<'a> {
         let steady = |last: usize| {
             // the switch-on is not steady, nor are the last periods where the end is late
             let range = onset + period..last - period.max((last - onset) / END);
-            let tone =
-                oscillation(&self.channels, &self.noise_std, &range, self.frequency, SEGMENT_PERIODS, self.rate_hz);
+            let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
             let duration_s = range.len() as f64 / self.rate_hz;
             let falls = tone.decline.rate_per_s.abs() * duration_s;
             let known = tone.decline.std_per_s * duration_s < DRIVEN_FALL;
@@ -351,6 +299,21 @@ impl<'a> Record<'a> {
             return why != DecayEnd::Noise && fall < 0.5;
         }
         decline.rate_per_s < decline.limit_per_s(options.decline_significance) || total < LEAST_FALL
+    }
+
+    /// Whether the decays may be those of a random vibration, which is normally distributed.
+    ///
+    /// Hits `x` decay times apart have a fourth moment of `1.5 x` times the second's square: 6 and more with quiet
+    /// between them. Of hits some two decay times apart it is a normal distribution's: they are taken for random.
+    fn is_random(&self, found: &DecaySearch) -> bool {
+        let kurtosis = |swing: &Vec<f64>| {
+            let moment = |power: i32| swing.iter().map(|y| y.powi(power)).sum::<f64>() / swing.len() as f64;
+            moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
+        };
+        let normal = |swing: &Vec<f64>| (kurtosis(swing) - 3.0).abs() < RANDOM_KURTOSIS;
+        let live = self.swings.iter().zip(&self.noise_std).filter(|(_, noise)| noise.is_finite());
+        let rises = found.decays.len() + found.steady.len();
+        !found.decays.is_empty() && rises >= RANDOM_RISES && live.map(|(swing, _)| swing).all(normal)
     }
 
     /// Leaves the `most` decays with the largest peaks over their noise, in order of time.

@@ -6,7 +6,6 @@ mod blocks;
 mod estimate;
 mod follows;
 mod noise;
-mod rings_on;
 #[cfg(test)]
 mod tests;
 
@@ -16,4 +15,3 @@ pub use blocks::{
 };
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
 pub use follows::chance_coherence;
-pub use rings_on::rings_on;
