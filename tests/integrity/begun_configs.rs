@@ -38,7 +38,7 @@ fn a_config_in_any_folder_finds_the_recordings_that_it_was_made_for() {
     let places = ["x.toml", "./y.toml", "../x.toml", "../../x.toml", "sub/x.toml", "link/x.toml", "link/../y.toml"];
     for place in places.into_iter().chain([absolute.as_str()]) {
         for (number, folder) in
-            ["archive", "./archive", "../work/archive", "same", "od[d]", "archive/r.h5"].iter().enumerate()
+            ["archive", "./archive", "../lab/archive", "same", "od[d]", "archive/r.h5"].iter().enumerate()
         {
             let config = place.replace(".toml", &format!("{number}.toml"));
             afmid(&here, &["new", "pipeline", folder, "--goal", "decay", "-o", &config]);
@@ -60,6 +60,6 @@ fn a_config_in_any_folder_finds_the_recordings_that_it_was_made_for() {
         }
     }
     assert_eq!(pattern(&here.join("x0.toml")), "archive/*.h5");
-    assert_eq!(pattern(&here.join("../x0.toml")), "work/archive/*.h5");
+    assert_eq!(pattern(&here.join("../x0.toml")), "lab/archive/*.h5");
     assert_eq!(pattern(&here.join("link/x0.toml")), "../../above/lab/archive/*.h5");
 }
