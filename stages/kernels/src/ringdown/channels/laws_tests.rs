@@ -154,22 +154,29 @@ fn errors_of_a_mode_that_follows_no_law_count_what_it_moves() {
     }
 }
 
-#[test]
-fn linear_decays_follow_no_laws() {
+/// Two linear modes of 0.32 and 0.48 Hz half width, so far apart; in one channel, or in two with unlike shapes.
+fn pairs_with_laws(apart_hz: &[f64], channels: usize, seeds: std::ops::Range<u64>) -> usize {
     let mut laws = 0;
-    for seed in 0..60_u64 {
+    for seed in seeds {
         let (interval_s, samples) = (5e-4, 2500);
         let linear = |frequency_hz: f64, damping: f64| Oscillator { frequency_hz, damping, cubic: 0.0, drag: 0.0 };
-        let pair = [linear(80.0, 0.004), linear(80.2 + 0.1 * (seed % 7) as f64, 0.006)];
+        let pair = [linear(80.0, 0.004), linear(80.0 + apart_hz[seed as usize % apart_hz.len()], 0.006)];
         let of = |system: &Oscillator| vec![system.decay(1.0, interval_s, samples)];
-        let shapes: [&[f64]; 2] = if seed % 2 == 0 { [&[1.0], &[0.7]] } else { [&[1.0, 0.5], &[-0.6, 1.0]] };
+        let shapes: [&[f64]; 2] = if channels == 1 { [&[1.0], &[0.7]] } else { [&[1.0, 0.5], &[-0.6, 1.0]] };
         let records = hits(&[(of(&pair[0]), shapes[0]), (of(&pair[1]), shapes[1])], 3e-3, 100 + seed);
         let found = followed(&records, interval_s).expect("a fit");
         if !found.along.is_empty() {
-            println!("seed {seed}: {:?}", found.fit.modes());
+            println!("{channels} channels, seed {seed}: {:?}", found.fit.modes());
         }
         laws += usize::from(!found.along.is_empty());
     }
-    // of one channel a pair nearer than half a half width may be as well described by a mode that moves
-    assert!(laws <= 3, "{laws}");
+    laws
+}
+
+#[test]
+fn linear_pairs_follow_no_laws() {
+    // noise alone makes a mode move once in a thousand records: of 60 none, or one
+    let two = pairs_with_laws(&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], 2, 0..30);
+    let one = pairs_with_laws(&[0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], 1, 30..60);
+    assert!(two + one <= 1, "{two} of two channels, {one} of one");
 }
