@@ -36,6 +36,12 @@ impl ModeEstimate {
         let Estimate { value, std } = self.quality_factor;
         Estimate { value: 0.5 / value, std: 0.5 * std / (value * value) }
     }
+
+    /// Its pole in the upper half plane, rad/s.
+    pub fn pole(&self) -> c64 {
+        let (w, ratio) = (std::f64::consts::TAU * self.frequency_hz.value, self.damping_ratio().value);
+        c64::new(-ratio * w, w * (1.0 - ratio * ratio).max(0.0).sqrt())
+    }
 }
 
 /// How the search ended.

@@ -316,7 +316,7 @@ fn seen(fit: &ChannelRingdown, interval_s: f64, part: &Range<usize>, least: f64)
 }
 
 /// For each of the `start` poles the number of the fitted one that it has become: the nearest pair first.
-pub(super) fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
+fn matched(start: &[c64], fitted: &[c64]) -> Vec<Option<usize>> {
     let distance = |(i, j): &(usize, usize)| (start[*i] - fitted[*j]).norm();
     let mut pairs: Vec<(usize, usize)> =
         (0..start.len()).flat_map(|i| (0..fitted.len()).map(move |j| (i, j))).collect();

@@ -9,7 +9,7 @@ use super::course::{FollowedDecay, nearest};
 use super::lines::{Lines, near};
 use super::options::ChannelOptions;
 use super::result::ChannelRingdown;
-use super::rows::{Rows, pole_of};
+use super::rows::Rows;
 use crate::model::{ModelError, go_on};
 use crate::ringdown::moving::{CoursePoint, FollowedLine, FollowedMode, Follows, Moving};
 use crate::statistics::chi_square_tail;
@@ -83,7 +83,7 @@ pub(super) fn follow_laws(
     }
     records.rows(&found, &mut rows);
     for course in rows.moving() {
-        rows.widen(course.mode, 0.5 * (pole_of(&course.last) - pole_of(&course.first)));
+        rows.widen(course.mode, 0.5 * (course.last.pole() - course.first.pole()));
     }
     for (mode, range) in rows.ranges() {
         rows.drop_multiples(mode, range);

@@ -9,8 +9,8 @@ use super::course::{FollowedDecay, ModeCourse, nearest};
 use super::laws::AmplitudeCourse;
 use super::result::ChannelRingdown;
 use super::shape::ShapePoint;
+use crate::ringdown::Estimate;
 use crate::ringdown::moving::FollowedMode;
-use crate::ringdown::{Estimate, ModeEstimate};
 
 /// Rows with tags that stay while others come and go.
 pub(super) struct Rows<'a> {
@@ -31,7 +31,7 @@ impl<'a> Rows<'a> {
     pub fn of(followed: FollowedDecay, all: &'a ChannelRingdown) -> Self {
         let at = |pole: c64| nearest(&all.poles, pole).unwrap_or(0);
         let from: Vec<usize> = followed.whole.poles.iter().map(|pole| at(*pole)).collect();
-        let dropped_from = followed.dropped.iter().map(|d| at(pole_of(&d.mode))).collect();
+        let dropped_from = followed.dropped.iter().map(|d| at(d.mode.pole())).collect();
         let next = from.len();
         Self { followed, all, tags: (0..next).collect(), from, dropped_from, next }
     }
@@ -148,10 +148,14 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The same of a line of several exponentials that no law describes: how far they lie from the row, weighted with their
-    /// energy. It is said to move.
+    /// The same of a line of several exponentials that no law describes: it is said to move, or where both parts do not
+    /// have it, the error counts how far the exponentials lie from the row, weighted with their energy.
     pub fn widen_line(&mut self, own: &[usize]) {
         let Some(tag) = self.of_poles(own).first().copied() else { return };
+        if let Some(course) = self.followed.course.iter_mut().find(|course| course.mode == tag) {
+            course.moves = true;
+            return;
+        }
         let Some(row) = self.place(tag).map(|at| self.followed.fit.poles[at]) else { return };
         let energy = energies(self.all);
         let sum: f64 = own.iter().map(|&j| energy[j]).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -159,7 +163,6 @@ impl<'a> Rows<'a> {
             (own.iter().map(|&j| energy[j] * part(self.all.poles[j] - row).powi(2)).sum::<f64>() / sum).sqrt()
         };
         self.widen(tag, c64::new(apart(|s| s.re), apart(|s| s.im)));
-        self.followed.course.iter_mut().filter(|course| course.mode == tag).for_each(|course| course.moves = true);
     }
 
     /// Modes that move from part to part.
@@ -170,7 +173,7 @@ impl<'a> Rows<'a> {
     /// Modes that move, by tag, with the least and the largest angular frequency that they pass through.
     pub fn ranges(&self) -> Vec<(usize, [f64; 2])> {
         let course = self.followed.course.iter().filter(|course| course.moves);
-        let parts = course.map(|course| (course.mode, vec![pole_of(&course.first).im, pole_of(&course.last).im]));
+        let parts = course.map(|course| (course.mode, vec![course.first.pole().im, course.last.pole().im]));
         let along = self.followed.along.iter().map(|along| {
             let turns = along.laws.course.iter().map(|at| TAU * at.frequency_hz.value).collect();
             (along.mode, turns)
@@ -311,9 +314,3 @@ impl ChannelRingdown {
 const WEAK_MULTIPLE: f64 = 0.0225;
 /// Damping ratio of a row, at least: nothing rings for longer than a hundred million periods.
 const LEAST_RATIO: f64 = 1e-9;
-
-/// Pole of a mode, rad/s.
-pub(super) fn pole_of(mode: &ModeEstimate) -> c64 {
-    let (omega, ratio) = (TAU * mode.frequency_hz.value, mode.damping_ratio().value);
-    c64::new(-ratio * omega, omega * (1.0 - ratio * ratio).max(0.0).sqrt())
-}

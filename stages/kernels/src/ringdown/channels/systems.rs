@@ -1,6 +1,5 @@
 //! Whether all hits are of one linear system.
 
-use faer::c64;
 use rayon::prelude::*;
 
 use super::companions::energies;
@@ -103,7 +102,7 @@ impl Alone {
         let modes = fit.modes();
         let mut motion = vec![0.0; modes.len()];
         for course in followed.course.iter().filter(|course| course.moves) {
-            motion[course.mode] = (pole(&course.last) - pole(&course.first)).norm();
+            motion[course.mode] = (course.last.pole() - course.first.pole()).norm();
         }
         let energies = energies(&fit);
         let strongest = (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]))?;
@@ -133,11 +132,4 @@ impl Alone {
         // a pole without a finite error is no evidence
         !square.is_finite() || chi_square_tail(square.max(0.0), 2) * hits as f64 >= MOVES
     }
-}
-
-/// Pole of a mode, rad/s.
-fn pole(mode: &ModeEstimate) -> c64 {
-    let w = std::f64::consts::TAU * mode.frequency_hz.value;
-    let damping = mode.damping_ratio().value;
-    c64::new(-damping * w, w * (1.0 - damping * damping).max(0.0).sqrt())
 }
