@@ -34,8 +34,8 @@ use afmid_kernels::ringdown::{
 /// Of several hits each is fitted by itself first: hits without a mode in common are of unlike systems, and those of one
 /// of them (`system`) are fitted.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
-/// mode; `hits` a row per hit and mode; `course` rows of each mode, from both parts or along its amplitude; `systems` a row per hit;
-/// `fit` over channel and time of the largest hit.
+/// mode; `hits` a row per hit and mode; `course` rows of each mode, from both parts or along its amplitude; `systems` a
+/// row per hit; `fit` over channel and time of the largest hit.
 /// Units: Hz; shapes relative to the channel with the largest amplitude; amplitudes in the channels' units.
 /// Accuracy: docs/results/decay.md. Standard errors count what the fit leaves round each mode (`lack_of_fit`).
 /// Errors: no decay with 24 samples (shorter ones are left out with a warning); no oscillation.
@@ -131,8 +131,8 @@ impl Stage for DecayFit {
         let motion = if whole { Motion::Whole } else { Motion::Laws };
         let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, motion)
             .map_err(StageError::from_error)?;
-        followed.fit.add_error_of_rate(decays.rate_relative_std);
-        let parts = Parts::new(&followed, &decays);
+        followed.add_error_of_rate(decays.rate_relative_std);
+        let parts = Parts::new(&followed, &decays, motion);
         let fit = &followed.fit;
         self.warn(fit, followed.fitted.poles.len(), &decays, cx);
         let companions = followed.dropped.iter().filter(|d| matches!(d.reason, Dropped::Companion { .. })).count();
@@ -143,7 +143,7 @@ impl Stage for DecayFit {
             ));
         }
         let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
-        parts.warnings(whole).into_iter().for_each(|warning| cx.warn(warning));
+        parts.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()
             .with(&MODES, modes_with_lack(fit))
             .with(&SHAPES, shape_array(&fit.shapes.iter().collect::<Vec<_>>(), &channels))
@@ -274,5 +274,43 @@ mod tests {
             follow_channels(&[vec![&long[..]], vec![&short[..]]], &[], 1e-3, &ChannelOptions::default(), Motion::Laws)
         };
         assert!(follows(LEAST_SAMPLES).is_ok() && follows(LEAST_SAMPLES - 1).is_err());
+    }
+
+    /// A pendulum of 0.5 rad at a quality factor of 150: one row, the last of its course, whatever the rate's error.
+    #[test]
+    fn row_and_course_of_a_mode_that_moves_share_their_numbers() {
+        let (w, interval_s) = (6.0, 0.03);
+        let (mut x, mut v) = (0.5_f64, 0.0);
+        let ring: Vec<f64> = (0..4000)
+            .map(|k| {
+                let now = x + 1e-3 * ((k * k) as f64).sin();
+                for _ in 0..60 {
+                    let step = interval_s / 60.0;
+                    // the speed half a step ahead
+                    v += step * (-w * w * x.sin() - w / 150.0 * v);
+                    x += step * v;
+                }
+                now
+            })
+            .collect();
+        let sensor = crate::at_hand::Named { name: "angle".to_owned(), unit: "rad".to_owned() };
+        for relative_std in [0.0, 1e-3] {
+            let decays = crate::at_hand::decays(&[vec![ring.clone()]], std::slice::from_ref(&sensor), 1.0 / interval_s);
+            let decays = decays.unwrap().attribute(crate::artifacts::RATE_RELATIVE_STD, relative_std);
+            let found = DecayFit::default().run(&Ports::new().with(&DECAYS, decays), &Context::alone(0)).unwrap();
+            let (modes, course) = (found.get(&MODES).unwrap(), found.get(&COURSE).unwrap());
+            assert_eq!((modes.rows(), course.rows()), (1, 12), "{modes:?}");
+            assert!(course.text("part").unwrap().iter().all(|part| part == "along"));
+            for name in ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std"] {
+                let (row, last) = (modes.real(name).unwrap()[0], course.real(name).unwrap()[11]);
+                assert!((row / last - 1.0).abs() < 1e-6, "{name}: {row}, {last}");
+            }
+            // the last amplitude is a tenth of the first or less: the small angle's frequency less 1/16 of its square
+            let (frequency, std) = (modes.real("frequency_hz").unwrap()[0], modes.real("frequency_std_hz").unwrap()[0]);
+            let amplitude = course.real("amplitude").unwrap()[11];
+            let truth = w / std::f64::consts::TAU * (1.0 - amplitude * amplitude / 16.0);
+            assert!((frequency - truth).abs() < 5.0 * std + 1e-5 * truth, "{frequency}, {truth}, {std}");
+            assert!(std > relative_std * truth);
+        }
     }
 }

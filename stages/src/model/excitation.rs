@@ -23,11 +23,10 @@ pub(super) fn require_more_than_a_sine(input: &[f64], output: &[f64], rate_hz: f
 mod tests {
     use std::f64::consts::TAU;
 
-    use afmid_pipeline::{Array, Axis, Context, Port, Ports, Stage};
+    use afmid_pipeline::{Array, Axis, Context, Ports, Stage};
 
+    use crate::model::pem::PAIR;
     use crate::model::{Pem, SubspaceEstimate};
-
-    const PAIR: Port<Array> = Port::new("pair", "pair", "input and output");
 
     /// A lag of a few samples that answers a sine, or a sine and a step; the output with noise.
     fn pair(cycles: f64, step: f64) -> Ports {

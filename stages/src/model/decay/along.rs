@@ -17,7 +17,8 @@ pub(super) struct Along<'a> {
 }
 
 impl<'a> Along<'a> {
-    pub fn new(course: &'a AmplitudeCourse) -> Self {
+    /// `end_s`: the decays' end, later than which no amplitude is reached.
+    pub fn new(course: &'a AmplitudeCourse, end_s: f64) -> Self {
         let rate = |at: &CoursePoint| TAU * at.frequency_hz.value * at.damping_ratio.value;
         let mut points: Vec<(f64, CoursePoint)> = Vec::new();
         for point in course.laws.course.iter().rev() {
@@ -25,7 +26,7 @@ impl<'a> Along<'a> {
                 // mean of the rates on the way from one amplitude to the next
                 Some((time, last)) => {
                     let mean = 0.5 * (rate(last) + rate(point));
-                    time + (last.amplitude / point.amplitude).ln() / mean.max(f64::MIN_POSITIVE)
+                    (time + (last.amplitude / point.amplitude).ln() / mean.max(f64::MIN_POSITIVE)).min(end_s)
                 }
                 None => 0.0,
             };
@@ -38,7 +39,8 @@ impl<'a> Along<'a> {
         self.course.mode
     }
 
-    /// Differences of frequency and damping ratio between the ends over their errors, and how probable both are.
+    /// Differences of frequency and damping ratio between the ends over both ends' errors, as if these were independent,
+    /// and how probable both are.
     fn ends(&self) -> (f64, f64, f64) {
         let (Some((_, first)), Some((_, last))) = (self.points.first(), self.points.last()) else {
             return (0.0, 0.0, 1.0);

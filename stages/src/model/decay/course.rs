@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::along::Along;
 use crate::artifacts::Decays;
-use afmid_kernels::ringdown::{Dropped, DroppedMode, Estimate, FollowedDecay, ModeCourse, ModeEstimate};
+use afmid_kernels::ringdown::{Dropped, DroppedMode, Estimate, FollowedDecay, ModeCourse, ModeEstimate, Motion};
 
 /// The modes in both parts or along their amplitude, with the decays' times.
 pub(super) struct Parts<'a> {
@@ -16,6 +16,7 @@ pub(super) struct Parts<'a> {
     along: Vec<Along<'a>>,
     /// Largest amplitude of each mode at the first free sample, at the channel of its shape's reference.
     first_amplitudes: Vec<f64>,
+    motion: Motion,
     sample_rate_hz: f64,
     /// After the decays' first free samples, s.
     end_s: f64,
@@ -37,16 +38,18 @@ pub(super) struct PartRow {
 }
 
 impl<'a> Parts<'a> {
-    pub fn new(followed: &'a FollowedDecay, decays: &Decays<'_>) -> Self {
+    pub fn new(followed: &'a FollowedDecay, decays: &Decays<'_>, motion: Motion) -> Self {
         let longest = decays.hits.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
         let sample_rate_hz = decays.sample_rate_hz;
+        let end_s = longest as f64 / sample_rate_hz;
         let largest = |amplitudes: &[num_complex::Complex64]| amplitudes.iter().map(|a| a.norm()).fold(0.0, f64::max);
         Self {
             modes: &followed.course,
-            along: followed.along.iter().map(Along::new).collect(),
+            along: followed.along.iter().map(|along| Along::new(along, end_s)).collect(),
+            motion,
             first_amplitudes: followed.whole.shapes.iter().map(|shape| largest(&shape.amplitudes)).collect(),
             sample_rate_hz,
-            end_s: longest as f64 / sample_rate_hz,
+            end_s,
         }
     }
 
@@ -86,7 +89,7 @@ impl<'a> Parts<'a> {
             .with("amplitude", "", "amplitude at its begin, in the unit of the channel in `hits`", |row| row.amplitude)
             .with_std(["frequency_hz", "frequency_std_hz"], "Hz", "frequency there", |row| row.frequency_hz)
             .with_std(["damping_ratio", "damping_ratio_std"], "1", "damping ratio there", |row| row.damping_ratio)
-            .with("frequency_z", "1", "difference of the frequencies at both ends over its error", |row| {
+            .with("frequency_z", "1", "difference of the frequencies at both ends over both errors", |row| {
                 row.frequency_z
             })
             .with("damping_z", "1", "the same of the damping ratios", |row| row.damping_z)
@@ -106,6 +109,12 @@ impl<'a> Parts<'a> {
                 "damping_ratio_std": damping.std,
             })
         };
+        let follows = |course: &ModeCourse| match (course.moves, self.motion) {
+            (false, _) => Some("linear"),
+            (true, Motion::Laws) => Some("no law"),
+            // nobody looked
+            (true, _) => None,
+        };
         let both = |course: &ModeCourse| {
             let [first, last] = self.times(course);
             json!({
@@ -116,7 +125,7 @@ impl<'a> Parts<'a> {
                 "damping_z": course.damping_z,
                 "p_value": course.p_value,
                 "moves": course.moves,
-                "follows": if course.moves { "no law" } else { "linear" },
+                "follows": follows(course),
                 "last_part_counts": course.far,
             })
         };
@@ -126,13 +135,14 @@ impl<'a> Parts<'a> {
         all.into_iter().map(|(_, document)| document).collect::<Vec<Value>>().into()
     }
 
-    /// One for each mode that moves; `whole`: the last part does not count.
-    pub fn warnings(&self, whole: bool) -> Vec<String> {
+    /// One for each mode that moves.
+    pub fn warnings(&self) -> Vec<String> {
         let moved = self.modes.iter().filter(|course| course.moves);
-        moved.map(|course| self.warning(course, whole)).chain(self.along.iter().map(Along::warning)).collect()
+        moved.map(|course| self.warning(course)).chain(self.along.iter().map(Along::warning)).collect()
     }
 
-    fn warning(&self, course: &ModeCourse, whole: bool) -> String {
+    fn warning(&self, course: &ModeCourse) -> String {
+        let whole = self.motion == Motion::Whole;
         let (before, after) = (course.first.damping_ratio(), course.last.damping_ratio());
         let counts = if course.far && !whole { ", the last part counts" } else { "" };
         let law = if whole { "" } else { ", and follows no law of its amplitude" };

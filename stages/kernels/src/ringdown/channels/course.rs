@@ -5,7 +5,7 @@ use std::ops::Range;
 use faer::c64;
 
 use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady, undetermined};
-use super::laws::{AmplitudeCourse, LawFit, follow_laws, oscillations};
+use super::laws::{AmplitudeCourse, LawFit, OneLine, follow_laws, oscillations};
 use super::levels::density;
 use super::options::{ChannelOptions, ModesWanted};
 use super::order::fit_channels;
@@ -69,6 +69,18 @@ pub struct FollowedDecay {
     pub residuals: Vec<Vec<Vec<f64>>>,
 }
 
+impl FollowedDecay {
+    /// As [`ChannelRingdown::add_error_of_rate`], along the amplitude of modes that follow laws too.
+    pub fn add_error_of_rate(&mut self, relative_std: f64) {
+        self.fit.add_error_of_rate(relative_std);
+        let add = |frequency: &mut Estimate| frequency.std = frequency.std.hypot(relative_std * frequency.value);
+        for along in &mut self.along {
+            add(&mut along.laws.frequency_hz);
+            along.laws.course.iter_mut().for_each(|at| add(&mut at.frequency_hz));
+        }
+    }
+}
+
 /// Probability that any mode of a linear decay is said to move.
 pub const MOVES: f64 = 1e-3;
 /// Decay times of a mode after which its last part begins.
@@ -125,8 +137,7 @@ pub fn follow_channels(
     let all = fit_channels(events, free, interval_s, options)?;
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
     let records = LawFit { all: &all, events, interval_s, options };
-    let linear =
-        |one_line: &[(usize, usize)]| follow_linear(&records, free, (fixed, motion == Motion::Whole), one_line);
+    let linear = |one_line: &[OneLine]| follow_linear(&records, free, (fixed, motion == Motion::Whole), one_line);
     if fixed || motion != Motion::Laws {
         return linear(&[]);
     }
@@ -136,13 +147,12 @@ pub fn follow_channels(
     }
 }
 
-/// The same of modes that are linear in each part; `one_line`: pairs of exponentials of which the first is no mode beside
-/// the second.
+/// The same of modes that are linear in each part; of the exponentials of `one_line` the strongest alone is a mode.
 fn follow_linear(
     records: &LawFit<'_>,
     free: &[Vec<&[f64]>],
     (fixed, whole): (bool, bool),
-    one_line: &[(usize, usize)],
+    one_line: &[OneLine],
 ) -> Result<FollowedDecay, ModelError> {
     let LawFit { all, events, interval_s, options } = *records;
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
@@ -152,10 +162,9 @@ fn follow_linear(
     let mut fit = all.without(&gone);
     let mut decays = Decays { events, free, interval_s, options, others: all.only(&gone) };
     let mut found = if fixed { Vec::new() } else { companions(&fit) };
-    for (more, of) in one_line {
+    for (more, of) in one_line.iter().flat_map(|line| line.own.iter().map(|more| (*more, line.main))) {
         let at = |j: usize| fit.poles.iter().position(|pole| *pole == all.poles[j]);
-        let (more, of) = (at(*more), at(*of));
-        if let (Some(more), Some(of)) = (more, of) {
+        if let (Some(more), Some(of), true) = (at(more), at(of), more != of) {
             found.retain(|pair| pair.0 != more && pair.0 != of);
             found.push((more, of, fit.shapes[more].mac(&fit.shapes[of])));
         }

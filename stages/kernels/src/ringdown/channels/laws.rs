@@ -34,6 +34,14 @@ const NEAR_MULTIPLE: f64 = 0.02;
 /// root, and beyond a factor of three are none of noise.
 pub(super) const LARGEST_LACK: f64 = 10.0;
 
+/// Exponentials of one line that are no modes by themselves.
+pub(super) struct OneLine {
+    /// The strongest of them.
+    pub main: usize,
+    /// All, by number.
+    pub own: Vec<usize>,
+}
+
 /// Linear modes that may share a line.
 const MOST_IN_ONE_LINE: usize = 3;
 
@@ -55,13 +63,13 @@ pub(super) struct LawFit<'a> {
 /// other exponentials taken off. A line with laws is one row; an exponential at a multiple of its frequency that falls
 /// with it none; several exponentials that describe a line better than any law are as many rows. A line that moves and
 /// follows no law is one row as well, a linear mode of its last part. `linear_of`: the linear fit with one mode in place
-/// of pairs.
+/// of such lines.
 /// # Errors
 /// Ended from outside. Where the fit fails the linear one stays.
 pub(super) fn follow_laws(
     records: &LawFit<'_>,
     linear: FollowedDecay,
-    linear_of: &dyn Fn(&[(usize, usize)]) -> Result<FollowedDecay, ModelError>,
+    linear_of: &dyn Fn(&[OneLine]) -> Result<FollowedDecay, ModelError>,
 ) -> Result<FollowedDecay, ModelError> {
     go_on(&records.options.watch)?;
     let given = records.suspects(&linear);
@@ -72,27 +80,20 @@ pub(super) fn follow_laws(
     let rows: Vec<(c64, usize)> = linear.whole.poles.iter().filter_map(at).collect();
     let Ok(found) = Lines::of(records, &given, &rows) else { return Ok(linear) };
     let refuted = records.moving_without_law(&linear, &found);
-    let one_line: Vec<(usize, usize)> = refuted
-        .iter()
-        .flat_map(|(main, own)| own.iter().filter(move |j| *j != main).map(move |j| (*j, *main)))
-        .collect();
-    let linear = if one_line.is_empty() { linear } else { linear_of(&one_line).unwrap_or(linear) };
+    let linear = if refuted.is_empty() { linear } else { linear_of(&refuted).unwrap_or(linear) };
     let mut rows = Rows::of(linear, records.all);
-    for (_, own) in &refuted {
-        rows.widen_line(own);
+    for line in &refuted {
+        rows.widen_line(&line.own);
     }
     records.rows(&found, &mut rows);
     for course in rows.moving() {
         rows.widen(course.mode, 0.5 * (course.last.pole() - course.first.pole()));
     }
+    // of a line that is several modes none lies within another's range by mistake
+    let several = found.fit.lines.iter().any(|line| matches!(line.follows, Follows::Beside | Follows::Exponentials(_)));
     for (mode, range) in rows.ranges() {
         rows.drop_multiples(mode, range);
-        if found
-            .fit
-            .lines
-            .iter()
-            .all(|line| line.follows != Follows::Beside && !matches!(line.follows, Follows::Exponentials(_)))
-        {
+        if !several {
             rows.drop_within(mode, range);
         }
     }
@@ -191,8 +192,8 @@ impl LawFit<'_> {
     }
 
     /// Lines that follow no law and are no linear modes either, for they move from part to part or need more exponentials
-    /// than modes share a line: the strongest exponential, and all.
-    fn moving_without_law(&self, linear: &FollowedDecay, found: &Lines) -> Vec<(usize, Vec<usize>)> {
+    /// than modes share a line.
+    fn moving_without_law(&self, linear: &FollowedDecay, found: &Lines) -> Vec<OneLine> {
         let energy = energies(self.all);
         let moves = |own: &[usize]| {
             linear.course.iter().filter(|course| course.moves).any(|course| {
@@ -206,7 +207,7 @@ impl LawFit<'_> {
             }
             let strongest = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]));
             if let Some(main) = strongest.filter(|_| moves(own) || own.len() > MOST_IN_ONE_LINE) {
-                refuted.push((main, own.clone()));
+                refuted.push(OneLine { main, own: own.clone() });
             }
         }
         refuted
