@@ -39,7 +39,7 @@ const STEPS: usize = 12;
 /// # Shapes
 /// As many samples of input as of output, 64 at least; otherwise none.
 /// # Accuracy
-/// An input of two sines or of a sine and noise of more than 1 % of its energy is no single sine, whatever the output.
+/// A sine of three periods and more. An input of two sines or of a sine and noise of more than 1 % of its energy is no single sine, whatever the output.
 /// # Source
 /// L. Ljung, System Identification, 1999, 13.2: persistence of excitation.
 pub fn single_sine(input: &[f64], output: &[f64]) -> Option<SingleSine> {
@@ -47,8 +47,7 @@ pub fn single_sine(input: &[f64], output: &[f64]) -> Option<SingleSine> {
     if samples != output.len() || samples < LEAST_SAMPLES || !input.iter().chain(output).all(|v| v.is_finite()) {
         return None;
     }
-    let begin = largest_bin(input);
-    let turn = refined(input, begin)?;
+    let turn = refined(input, line(input)?)?;
     let columns = sine_columns(samples, turn, None);
     let plain = Mat::from_fn(samples, 2, |k, j| if j == 0 { 1.0 } else { centred(samples, k) });
     let (rest_in, rest_out) = (without(&columns, input), without(&columns, output));
@@ -76,15 +75,21 @@ fn centred(samples: usize, k: usize) -> f64 {
     k as f64 - 0.5 * (samples - 1) as f64
 }
 
-/// Frequency of the largest bin, rad per sample.
-fn largest_bin(input: &[f64]) -> f64 {
+/// Frequency of the largest bin, rad per sample; none where most of the energy is elsewhere, or what is slow is no more
+/// than a drift.
+fn line(input: &[f64]) -> Option<f64> {
     let samples = input.len();
     let mean = input.iter().sum::<f64>() / samples as f64;
     let rows = vec![input.iter().map(|u| u - mean).collect::<Vec<f64>>()];
     let power = mean_periodogram(&rows, &hann(samples, 0.0));
-    let best = (1..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b])).unwrap_or(1);
-    TAU * best as f64 / samples as f64
+    let best = (1..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
+    // a Hann window's line is within two bins of its place
+    let near = power[best.saturating_sub(2)..(best + 3).min(power.len())].iter().sum::<f64>();
+    (best >= LEAST_PERIODS && near > 0.5 * power.iter().sum::<f64>()).then(|| TAU * best as f64 / samples as f64)
 }
+
+/// Periods of a sine in the record, at least.
+const LEAST_PERIODS: usize = 3;
 
 /// Level, slope, cosine and sine of a frequency; with its amplitudes what a change of the frequency adds.
 fn sine_columns(samples: usize, turn: f64, amplitudes: Option<(f64, f64)>) -> Mat<f64> {
