@@ -3,7 +3,8 @@
 //! Memory that is reserved counts there, used or not: the C library keeps 64 MiB for each thread that allocates, and
 //! products of matrices (faer's gemm) twice the largest cache for each thread that makes one. A failed reservation ends
 //! a program at once. Under a limit the program starts itself again with one arena for all threads and as many threads
-//! as there is room for. Results do not depend on the number of threads.
+//! as there is room for; where there is none for a single product, commands that make some are refused. Results do not
+//! depend on the number of threads.
 
 use std::fs;
 use std::os::unix::process::CommandExt;
@@ -45,6 +46,27 @@ pub fn fit() {
     let _ = command.exec();
 }
 
+/// That there is a limit which has no room for a product of matrices, and what has; none where it has.
+pub fn too_little() -> Option<(String, String)> {
+    let limit = limit_bytes(&fs::read_to_string("/proc/self/limits").unwrap_or_default())?;
+    lacking(limit, largest_cache_bytes())
+}
+
+/// That a limit has no room for a product of matrices, and what has; none where it has.
+fn lacking(limit_bytes: u64, cache_bytes: u64) -> Option<(String, String)> {
+    let (product, mb) = (cache_bytes.saturating_mul(2), |bytes: u64| bytes / 1_000_000);
+    (limit_bytes < product.saturating_add(THREAD_BYTES)).then(|| {
+        let problem = format!(
+            "the address space is limited to {} MB, and products of matrices reserve {} MB, twice this machine's largest \
+             cache, whatever the size of the data",
+            mb(limit_bytes),
+            mb(product)
+        );
+        let wanted = product.saturating_add(PROGRAM_BYTES).saturating_add(THREAD_BYTES) >> 10;
+        (problem, format!("`ulimit -v {wanted}` has room for one thread; little of it is used"))
+    })
+}
+
 /// Threads that a limit has room for, one at least.
 fn threads(limit_bytes: u64, cache_bytes: u64) -> u64 {
     (limit_bytes.saturating_sub(PROGRAM_BYTES) / cache_bytes.saturating_mul(2).saturating_add(THREAD_BYTES)).max(1)
@@ -77,5 +99,9 @@ mod tests {
         assert_eq!([100, 300, 500, 2000].map(|limit| threads(limit * mib, 32 * mib)), [1, 1, 3, 22]);
         // a cache larger than the limit
         assert_eq!(threads(500 * mib, u64::MAX / 4), 1);
+        assert!(lacking(500 * mib, 32 * mib).is_none() && lacking(500 * mib, u64::MAX / 4).is_some());
+        let (problem, help) = lacking(500 * mib, 480 * mib).expect("too little");
+        assert!(problem.contains("limited to 524 MB") && problem.contains("reserve 1006 MB"), "{problem}");
+        assert!(help.contains("ulimit -v 1196032`"), "{help}");
     }
 }

@@ -202,6 +202,16 @@ pub struct ExamArgs {
     pub json: bool,
 }
 
+impl Command {
+    /// Whether it makes products of matrices.
+    pub const fn computes(&self) -> bool {
+        matches!(
+            self,
+            Self::Run(_) | Self::Batch(_) | Self::Rerun(_) | Self::New { .. } | Self::Inspect { .. } | Self::Exam(_)
+        )
+    }
+}
+
 /// What an exam hides.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum ExamKind {

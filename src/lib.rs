@@ -64,7 +64,10 @@ pub fn exit_code(registry: &Registry) -> u8 {
     let parsed =
         cli::command().try_get_matches_from(arguments).and_then(|matches| cli::Cli::from_arg_matches(&matches));
     let done = match parsed {
-        Ok(cli) => commands::dispatch(cli.command, registry),
+        Ok(cli) => match address_space::too_little().filter(|_| cli.command.computes()) {
+            Some((problem, help)) => Err(Failure::failed(problem, Some(help))),
+            None => commands::dispatch(cli.command, registry),
+        },
         Err(error) => help_or_mistake(&error),
     };
     interrupt::check().and(done).map_or_else(output::report, |()| 0)
