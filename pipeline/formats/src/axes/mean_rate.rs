@@ -2,7 +2,7 @@
 
 use crate::FoundChannel;
 use crate::rate::fewest_digits;
-use crate::time_units::{names_times, seconds};
+use crate::time_units::{seconds, time_name};
 
 /// Rates that differ by more, relative, are not of one recording: jitter and rounding of times make less.
 const CONTRADICTS: f64 = 1e-2;
@@ -16,10 +16,14 @@ pub fn mean_rate<'a>(channels: &'a [FoundChannel], of: &FoundChannel) -> Option<
     Some((rate_of(axis, unit_s)?, axis.location.as_str()))
 }
 
-/// The axis of times of a channel's length, and the seconds of its unit; none where there is none, or it counts.
+/// The axis of times of a channel's length, of several the nearest one before it, and the seconds of its unit; none where
+/// there is none, or it counts.
 pub(crate) fn times_beside<'a>(channels: &'a [FoundChannel], of: &FoundChannel) -> Option<(&'a FoundChannel, f64)> {
-    let beside = channels.iter().filter(|axis| axis.is_axis && axis.samples == of.samples && axis.samples > 1);
-    let (axis, unit_s) = beside.filter_map(|axis| Some((axis, seconds_in(axis)?))).next()?;
+    let fits = |axis: &&FoundChannel| axis.is_axis && axis.samples == of.samples && axis.samples > 1;
+    let times = |axis: &'a FoundChannel| Some((axis, seconds_in(axis)?));
+    let own = channels.iter().position(|channel| channel.location == of.location).unwrap_or(channels.len());
+    let before = channels.iter().take(own).rev().filter(fits).find_map(times);
+    let (axis, unit_s) = before.or_else(|| channels.iter().filter(fits).find_map(times))?;
     rate_of(axis, unit_s).map(|_| (axis, unit_s))
 }
 
@@ -49,7 +53,8 @@ pub fn contradiction(channels: &[FoundChannel], of: &FoundChannel, given_hz: f64
 fn seconds_in(axis: &FoundChannel) -> Option<f64> {
     let name = axis.location.rsplit(['/', '.']).next().unwrap_or_default();
     match axis.unit.as_str() {
-        "" => names_times(name).then_some(1.0),
+        // an axis that is called `t_{1}` or `Time B` is of times, too
+        "" => time_name(name, false).map(|name| name.seconds.unwrap_or(1.0)),
         unit => seconds(unit),
     }
 }
@@ -89,6 +94,7 @@ mod tests {
         for (name, unit, step, given) in [
             ("Time", "s", 5e-3, 201.0),
             ("Time", "ms", 5.0, 200.0),
+            ("t_{1}", "", 5e-3, 200.0),
             // milliseconds, which nothing says
             ("time", "", 5.1, 196.0),
             ("position", "mm", 5e-3, 44_100.0),
@@ -96,5 +102,17 @@ mod tests {
         ] {
             assert_eq!(said(name, unit, step, given), None, "{name} {unit} {step}");
         }
+        assert!(said("t_{1}", "", 5e-3, 44_100.0).is_some());
+    }
+
+    #[test]
+    fn of_several_axes_the_nearest_one_before_a_channel_is_its_own() {
+        let mut all = channels("Time A", "", 5e-3);
+        let mut second = channels("Time B", "", 2e-3);
+        second[1].location = "z".to_owned();
+        all.append(&mut second);
+        let rate = |number: usize| mean_rate(&all, &all[number]).map(|(rate, axis)| (rate.round(), axis.to_owned()));
+        assert_eq!(rate(1), Some((200.0, "Time A".to_owned())));
+        assert_eq!(rate(3), Some((500.0, "Time B".to_owned())));
     }
 }
