@@ -7,6 +7,7 @@ mod address_space;
 mod batch;
 mod cli;
 mod commands;
+mod determined;
 mod diagnostic;
 mod doctor;
 mod export;

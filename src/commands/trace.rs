@@ -13,7 +13,7 @@ use crate::provenance::files::Finder;
 use crate::provenance::located::{Dataset, Located, Lost, locate};
 use crate::provenance::path::parse;
 use crate::provenance::tree::{ancestors, stage_json, tree_text};
-use crate::show::{pretty, with_std};
+use crate::show::{named_with_std, pretty};
 
 /// Traces a number and prints its ancestry.
 pub fn run(args: &TraceArgs) -> Result<(), Failure> {
@@ -36,7 +36,10 @@ pub fn run(args: &TraceArgs) -> Result<(), Failure> {
 fn head(file: &ResultFile, located: &Located) -> String {
     let run = file.run();
     let value = match (&located.value, located.standard_error) {
-        (Value::Number(number), Some(std)) => with_std(number.as_f64().unwrap_or(f64::NAN), std),
+        (Value::Number(number), Some(std)) => {
+            let name = located.path.rsplit(['.', '/']).next().unwrap_or_default();
+            named_with_std(name, number.as_f64().unwrap_or(f64::NAN), std)
+        }
         (value, _) => shortened(&value.to_string()),
     };
     let mut text = format!("{} = {value}\n", one_line(&located.path));

@@ -7,7 +7,7 @@ use afmid_pipeline::{Array, Artifact, Attribute, Column, Recording, StateSpace, 
 
 use super::document::document_text;
 use super::grid::grid;
-use super::number::{number, with_std};
+use super::number::{named_with_std, number};
 use super::partners::Partners;
 use crate::printable::one_line;
 
@@ -126,7 +126,7 @@ fn cell(column: &Column, std: Option<&Column>, row: usize) -> String {
     };
     let text = match &column.values {
         ColumnValues::Real(values) => match (values.get(row), std.and_then(real)) {
-            (Some(&value), Some(std)) => Some(with_std(value, std)),
+            (Some(&value), Some(std)) => Some(named_with_std(&column.name, value, std)),
             (value, _) => value.map(|&value| number(value)),
         },
         ColumnValues::Integer(values) => values.get(row).map(i64::to_string),
@@ -155,7 +155,7 @@ fn attributes_text(attributes: &BTreeMap<String, Attribute>) -> String {
     let line = |(name, value): (&String, &Attribute)| {
         let std = partners.std(name).and_then(|std| attributes.get(std)).and_then(Attribute::as_f64);
         let text = match (value, std) {
-            (Attribute::Real(value), Some(std)) => with_std(*value, std),
+            (Attribute::Real(value), Some(std)) => named_with_std(name, *value, std),
             (Attribute::Real(value), None) => number(*value),
             (Attribute::Integer(value), _) => value.to_string(),
             (Attribute::Flag(flag), _) => yes_or_no(*flag).to_owned(),

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::columns::columns;
 use super::grid::narrow_grid;
-use super::number::{number, with_std};
+use super::number::{named_with_std, number};
 use super::partners::Partners;
 use crate::printable::one_line;
 
@@ -26,7 +26,7 @@ fn write_object(entries: &Map<String, Value>, depth: usize, text: &mut String) {
     for (name, value) in entries.iter().filter(|(name, _)| !partners.is_std(name)) {
         match partners.std(name).and_then(|std| entries.get(std)) {
             Some(std) if value.is_number() => {
-                text.push_str(&format!("{}{}: {}\n", indent(depth), one_line(name), uncertain(value, std)));
+                text.push_str(&format!("{}{}: {}\n", indent(depth), one_line(name), uncertain(name, value, std)));
             }
             _ => write_value(name, value, depth, text),
         }
@@ -83,7 +83,9 @@ fn table(values: &[Value]) -> Option<Vec<Vec<String>>> {
     let mut rows: Vec<Vec<String>> = vec![shown.iter().map(|(name, _)| (*name).to_owned()).collect()];
     for object in objects {
         let cell = |(name, std): &(&str, Option<&str>)| match (object.get(*name), std) {
-            (Some(value), Some(std)) if value.is_number() => uncertain(value, object.get(*std).unwrap_or(&Value::Null)),
+            (Some(value), Some(std)) if value.is_number() => {
+                uncertain(name, value, object.get(*std).unwrap_or(&Value::Null))
+            }
             (value, _) => value.map_or(String::new(), scalar_text),
         };
         rows.push(shown.iter().map(cell).collect());
@@ -91,8 +93,8 @@ fn table(values: &[Value]) -> Option<Vec<Vec<String>>> {
     Some(rows)
 }
 
-fn uncertain(value: &Value, std: &Value) -> String {
-    with_std(value.as_f64().unwrap_or(f64::NAN), std.as_f64().unwrap_or(f64::NAN))
+fn uncertain(name: &str, value: &Value, std: &Value) -> String {
+    named_with_std(name, value.as_f64().unwrap_or(f64::NAN), std.as_f64().unwrap_or(f64::NAN))
 }
 
 fn scalar_text(value: &Value) -> String {

@@ -18,7 +18,7 @@ pub use change::{change_json, change_text};
 pub use columns::columns;
 pub use grid::grid;
 pub use json::artifact_json;
-pub use number::{number, with_std};
+pub use number::{named_with_std, number};
 pub use overview::{overview_json, overview_text, stage_head};
 pub use pretty::pretty;
 pub use size::size;

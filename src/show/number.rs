@@ -1,5 +1,7 @@
 //! Numbers for people.
 
+use crate::determined::{UNDETERMINED, says};
+
 /// A number with six significant digits; what is unknown (NaN) is `-`.
 pub fn number(value: f64) -> String {
     if value.is_nan() {
@@ -19,6 +21,11 @@ pub fn number(value: f64) -> String {
         Some((digits, power)) => format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.')),
         None => text,
     }
+}
+
+/// The value of that name with its standard deviation, where it says anything.
+pub fn named_with_std(name: &str, value: f64, std: f64) -> String {
+    if says(name, value, std) { with_std(value, std) } else { UNDETERMINED.to_owned() }
 }
 
 /// A value with its standard deviation in its last two digits: `46300.10(40)` is 46300.10 +- 0.40.

@@ -10,7 +10,7 @@ mod stabilisation;
 mod transfer;
 
 pub(crate) use bode::{Bode, BodeCurve, Smoothness, bode_figure, bode_panels};
-pub(crate) use modal_table::{modal_tables, with_percent};
+pub(crate) use modal_table::{modal_tables, where_known, with_percent};
 pub(crate) use pole_zero::pole_zero_figure;
 pub(crate) use response::model_curve;
 pub(crate) use stabilisation::{pole_marks, stabilisation_figures};

@@ -3,18 +3,31 @@
 use afmid_pipeline::{Document, RunResult};
 use serde_json::Value;
 
+use crate::determined::{UNDETERMINED, is_determined};
 use crate::report::find::{Found, all};
 use crate::report::number::{UNKNOWN, number, quantity, with_error};
 use crate::report::origin::{COUPLED, Origin};
 use crate::report::view::{Head, TableView};
 
-/// One table for each stage whose summary lists modes, those of a coupled lever last.
+/// Lists of a summary beside its modes, and what is said of them.
+const APART: [(&str, &str); 2] = [
+    ("damped", "Strongly damped: oscillations of a quality factor below that of a mode"),
+    ("unexcited", "Unexcited, and no modes: the response does not follow the input there"),
+];
+
+/// One table for each stage whose summary lists modes, those of a coupled lever last; under it what is listed apart.
 pub(crate) fn modal_tables(run: &RunResult) -> Vec<TableView> {
     let mut found: Vec<(bool, TableView)> = all::<Document>(run)
         .filter(|found| found.port == "summary")
-        .filter_map(|found| {
+        .flat_map(|found| {
             let origin = Origin::of(run, found.stage);
-            Some((origin == COUPLED, modal_table(&found, origin)?))
+            let modes = modal_table(&found, origin, "modes", &caption(&found, origin));
+            let apart = APART.iter().filter_map(|(name, said)| {
+                let some = found.value.0.get(*name)?.as_array().is_some_and(|list| !list.is_empty());
+                let caption = format!("{said} (stage {}).", found.stage.id);
+                if some { modal_table(&found, origin, name, &caption) } else { None }
+            });
+            modes.into_iter().chain(apart).map(|table| (origin == COUPLED, table)).collect::<Vec<_>>()
         })
         .collect();
     found.sort_by_key(|(coupled, _)| *coupled);
@@ -49,13 +62,18 @@ impl Modes<'_> {
     }
 }
 
+/// A quantity that is above zero, where its error says that it is.
+pub(crate) fn where_known(value: f64, std: f64, written: impl FnOnce() -> String) -> String {
+    if is_determined(value, std) { written() } else { UNDETERMINED.to_owned() }
+}
+
 /// Columns for a reference of the column before.
 const REFERENCE: [&str; 3] = ["reference", "difference", "in σ"];
 
-fn modal_table(found: &Found<'_, Document>, origin: Origin) -> Option<TableView> {
+fn modal_table(found: &Found<'_, Document>, origin: Origin, name: &str, caption: &str) -> Option<TableView> {
     let document = &found.value.0;
     let list = |name: &str| document.get(name).and_then(Value::as_array).map(Vec::as_slice);
-    let modes = Modes { modes: list("modes")?, references: list("reference").unwrap_or_default() };
+    let modes = Modes { modes: list(name)?, references: list("reference").unwrap_or_default() };
     let (f_ref, q_ref) = (modes.has("reference_frequency_hz"), modes.has("reference_quality_factor"));
     let damping = modes.has("damping_ratio");
     let share = origin.words().static_share && modes.has("static_share");
@@ -68,20 +86,21 @@ fn modal_table(found: &Found<'_, Document>, origin: Origin) -> Option<TableView>
         (share, &["static share"]),
     ];
     let shown = columns.iter().filter(|(shown, _)| *shown).flat_map(|(_, names)| *names);
-    let mut table = TableView::new(&caption(found, origin), shown.map(|name| Head::number(name, "")).collect());
+    let mut table = TableView::new(caption, shown.map(|name| Head::number(name, "")).collect());
     for (index, mode) in modes.modes.iter().enumerate() {
         let at = |name: &str| modes.at(mode, name);
         let (f, f_std) = (at("frequency_hz"), at("frequency_std_hz"));
         let (q, q_std) = (at("quality_factor"), at("quality_factor_std"));
-        let mut row = vec![(index + 1).to_string(), quantity(f, f_std, "Hz")];
+        let mut row = vec![(index + 1).to_string(), where_known(f, f_std, || quantity(f, f_std, "Hz"))];
         if f_ref {
             let reference = at("reference_frequency_hz");
             row.extend([quantity(reference, f64::NAN, "Hz"), relative(f, reference), sigmas(f, f_std, reference)]);
         }
         if damping {
-            row.push(with_percent(at("damping_ratio"), at("damping_ratio_std")));
+            let (ratio, std) = (at("damping_ratio"), at("damping_ratio_std"));
+            row.push(where_known(ratio, std, || with_percent(ratio, std)));
         }
-        row.push(with_error(q, q_std));
+        row.push(where_known(q, q_std, || with_error(q, q_std)));
         if q_ref {
             let reference = at("reference_quality_factor");
             row.extend([number(reference), relative(q, reference), sigmas(q, q_std, reference)]);

@@ -5,7 +5,7 @@ use afmid_pipeline::{Array, Document, RunResult};
 use serde_json::Value;
 
 use super::channel_axis;
-use crate::report::estimates::with_percent;
+use crate::report::estimates::{where_known, with_percent};
 use crate::report::figure::{Axis, Colour, Figure, Mark, Panel, Row, Stroke, slug};
 use crate::report::find::{Found, all, unit_of};
 use crate::report::number::{quantity, rounded};
@@ -40,14 +40,17 @@ fn parts(document: &Document) -> Option<TableView> {
         };
         for (name, point) in points {
             let at = |name: &str| point.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+            let of = |name: &str, std: &str, written: fn(f64, f64) -> String| {
+                where_known(at(name), at(std), || written(at(name), at(std)))
+            };
             table.rows.push(vec![
                 number.clone(),
                 name.to_owned(),
                 if along.is_some() { rounded(at("from_s"), 4, "s") } else { quantity(at("from_s"), f64::NAN, "s") },
                 if along.is_some() { String::new() } else { quantity(at("to_s"), f64::NAN, "s") },
                 if along.is_some() { rounded(at("amplitude"), 4, "") } else { String::new() },
-                quantity(at("frequency_hz"), at("frequency_std_hz"), "Hz"),
-                with_percent(at("damping_ratio"), at("damping_ratio_std")),
+                of("frequency_hz", "frequency_std_hz", |value, std| quantity(value, std, "Hz")),
+                of("damping_ratio", "damping_ratio_std", with_percent),
                 moves.to_owned(),
             ]);
         }

@@ -9,6 +9,9 @@ use afmid_kernels::frf_modes::{FrfMode, FrfModes};
 const TURNING: f64 = 0.5;
 /// Lines that count as one from which on it is said. Why: a Hann window makes two alike.
 const ALIKE: f64 = 3.0;
+/// Variance that a fit leaves round a mode, over that of the responses' noise, from which on it is said. Why: errors of
+/// responses are known to a factor of two at worst.
+const LACKS: f64 = 9.0;
 /// Standard errors below zero from which on a modal constant has the wrong sign. Why: chance does so in a thousandth.
 const WRONG: f64 = 3.0;
 
@@ -28,7 +31,7 @@ pub(super) struct Remarks<'a> {
 impl Remarks<'_> {
     /// All of them.
     pub fn all(&self) -> Vec<String> {
-        [self.minimum(), self.count(), self.turning(), self.mass(), self.signs(), self.alike()]
+        [self.minimum(), self.count(), self.turning(), self.mass(), self.signs(), self.lacking(), self.alike()]
             .into_iter()
             .flatten()
             .collect()
@@ -92,6 +95,19 @@ impl Remarks<'_> {
                  with the force there in every mode, so the points are not one, or these are no modes; their shapes at \
                  unit modal mass have no meaning"
             ),
+        })
+    }
+
+    fn lacking(&self) -> Option<String> {
+        let modes = (1..).zip(&self.found.modes).filter(|(_, mode)| mode.lack_of_fit > LACKS);
+        let factors: Vec<String> =
+            modes.map(|(number, mode)| format!("{number} ({:.0})", mode.lack_of_fit.sqrt())).collect();
+        (!factors.is_empty()).then(|| {
+            format!(
+                "the fit leaves more than the responses' noise round modes {}: their standard errors are widened by the \
+                 factors given; what was measured is not linear there, or modes are missing",
+                factors.join(", ")
+            )
         })
     }
 

@@ -61,3 +61,33 @@ fn a_response_without_values_is_refused_by_name() {
     let error = run(&FrfModeFit::default(), dead).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("response 2 (2) has fewer than 8 values"), "{error}");
 }
+
+#[test]
+fn neither_scale_nor_a_value_at_zero_hertz_moves_a_mode() {
+    let numbers = |frf: NewFrf| -> Vec<f64> {
+        let (ports, _) = found(frf);
+        let table = ports.get(&MODES).unwrap();
+        let columns = ["frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std"];
+        columns.iter().flat_map(|name| table.real(name).unwrap().to_vec()).collect()
+    };
+    let plain = numbers(responses());
+    assert_eq!(plain.len(), 8);
+    let near =
+        |other: &[f64]| plain.len() == other.len() && plain.iter().zip(other).all(|(a, b)| (a / b - 1.0).abs() < 1e-6);
+    for factor in [1e-12, 1e12] {
+        let mut scaled = responses();
+        scaled.frf.iter_mut().for_each(|h| *h *= factor);
+        let other = numbers(scaled);
+        assert!(near(&other), "{factor}: {plain:?} {other:?}");
+    }
+    // receptances go with the inverse square of the frequency: a zero bin would have all the weight
+    for value in [Complex64::new(0.0, 0.0), Complex64::new(f64::NAN, f64::NAN), Complex64::new(1e6, 0.0)] {
+        let mut with_zero = responses();
+        let all = with_zero.frequency_hz.len();
+        with_zero.frequency_hz.insert(0, 0.0);
+        with_zero.frf =
+            with_zero.frf.chunks(all).flat_map(|row| std::iter::once(value).chain(row.iter().copied())).collect();
+        let other = numbers(with_zero);
+        assert!(near(&other), "{value}: {plain:?} {other:?}");
+    }
+}
