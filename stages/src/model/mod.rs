@@ -20,6 +20,8 @@ mod order;
 mod pem;
 mod realised;
 mod ringdown;
+#[cfg(test)]
+mod scale_tests;
 mod stabilisation;
 mod subspace;
 mod system_poles;

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use self::driven::leave_out_undriven;
+use self::driven::mark_unexcited;
 use self::none::no_mode;
 use super::pem::MODEL;
 use crate::artifacts::{
@@ -32,15 +32,17 @@ use afmid_kernels::validation::{noise_ceiling_percent, simulate_held_out};
 ///
 /// Model: s = ln(z) / Ts, f = |s| / 2 pi, Q = |s| / (-2 Re s), pole by pole; a mode is an established, weakly damped
 /// pair, and of a pair that was measured (no averaged event) one near which the response follows the input: its
-/// coherence there is above chance at 0.1 %; the rest are detector poles, doubtful pairs, and real negative ones, which
-/// have no continuous counterpart.
+/// coherence there is above chance at 0.1 %; else it is unexcited. Established pairs of a quality factor between 0.5 and
+/// `min_quality_factor` are damped; the rest are detector poles, doubtful pairs, and real negative ones, which have no
+/// continuous counterpart.
 /// Method: zeros are the invariant zeros of (A, B, C, D). Standard errors by the delta method from the model's
 /// covariance. Held-out fit: the model of the identification half simulated on the verification half's force, initial
 /// state, offset and drift fitted again. The error of a static share counts the ambiguity of t0: an event that was d
 /// earlier turns and raises the mode's amplitude by exp(-s d); the root mean square over the pair's `t0_ambiguity_s`,
 /// at least one sample, is added in squares. Intervals are those of 95 %: normal for frequencies, quality factors, gain
 /// and delay, log-normal for the response's magnitude; the phase's is 1.96 `phase_std` on either side.
-/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one); `response` over frequency. Of
+/// Shapes: `modes` and `roots` by row, ascending in frequency (of a pair the upper one; `damped` and `unexcited` pairs are
+/// in `roots` by their class and in the summary); `response` over frequency. Of
 /// a model with several inputs zeros, shares and response are those of the first. `at_rest` in the summary: static
 /// gain, and the group delay at zero frequency, without the hold's half sample if `intersample` is held.
 /// Units: Hz; static shares are parts of the static gain.
@@ -100,7 +102,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 10,
+        version: 11,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -126,7 +128,7 @@ impl Stage for Modes {
         let mut found = poles(&model, &covariance, &self.criteria).map_err(StageError::from_error)?;
         let pair = inputs.find(&PAIR)?;
         if let Some(pair) = pair {
-            leave_out_undriven(&mut found, pair, cx)?;
+            mark_unexcited(&mut found, pair, cx)?;
         }
         let ambiguity_s = onset_ambiguity(artifact);
         for pole in found.iter_mut().filter(|pole| pole.root.is_complex()) {
@@ -134,7 +136,9 @@ impl Stage for Modes {
             pole.static_share_std = pole.static_share_std.hypot(from_onset);
         }
         let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
-        let modes: Vec<&Pole> = found.iter().filter(|pole| pole.kind == PoleClass::Mechanical).collect();
+        let of = |kind: PoleClass| found.iter().filter(|pole| pole.kind == kind).collect::<Vec<&Pole>>();
+        let modes = of(PoleClass::Mechanical);
+        let listed = |kind: PoleClass| of(kind).into_iter().map(with_share).collect::<Vec<Value>>();
         if modes.is_empty() {
             cx.warn(no_mode(&found, &self.criteria));
         }
@@ -150,7 +154,9 @@ impl Stage for Modes {
         )
         .map_err(StageError::from_error)?;
         let summary = Document::new(&json!({
-            "modes": modes.iter().map(|mode| with_share(mode)).collect::<Vec<Value>>(),
+            "modes": listed(PoleClass::Mechanical),
+            "damped": listed(PoleClass::Damped),
+            "unexcited": listed(PoleClass::Unexcited),
             "fit_percent": {
                 "identification": fits.identification,
                 "held_out": fits.held_out,

@@ -12,7 +12,11 @@ use crate::model::{InnovationsModel, ModelError, Section, transmission_zeros};
 pub enum PoleClass {
     /// A resonance of the lever.
     Mechanical,
-    /// Detector, electronics, slow wander: strongly damped, or real.
+    /// An established pair with a quality factor between 0.5 and the least one of a mode.
+    Damped,
+    /// A pair near which the response does not follow the input.
+    Unexcited,
+    /// Detector, electronics, slow wander: real, or strongly damped and not established.
     Detector,
     /// A complex pair that the data do not establish: too small, or its damping unknown.
     Doubtful,
@@ -27,6 +31,8 @@ impl PoleClass {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mechanical => "mechanical",
+            Self::Damped => "damped",
+            Self::Unexcited => "unexcited",
             Self::Detector => "detector",
             Self::Doubtful => "doubtful",
             Self::Nyquist => "nyquist",
@@ -191,13 +197,16 @@ fn classify(root: &Root, significance: f64, criteria: &ModeCriteria) -> PoleClas
     if !root.is_complex() {
         return if root.z.re < 0.0 { PoleClass::Nyquist } else { PoleClass::Detector };
     }
-    if root.quality_factor < criteria.min_quality_factor {
-        return PoleClass::Detector;
-    }
     let established = significance >= criteria.min_significance
         && root.quality_factor_std <= criteria.max_quality_factor_error * root.quality_factor
         && criteria.max_frequency_hz.is_none_or(|most| root.frequency_hz <= most);
-    if established { PoleClass::Mechanical } else { PoleClass::Doubtful }
+    match (root.quality_factor < criteria.min_quality_factor, established) {
+        (false, true) => PoleClass::Mechanical,
+        (false, false) => PoleClass::Doubtful,
+        // what grows has a negative one
+        (true, true) if root.quality_factor > 0.5 => PoleClass::Damped,
+        (true, _) => PoleClass::Detector,
+    }
 }
 
 /// All transmission zeros, ascending in frequency, with standard errors; of a pair only the upper one.

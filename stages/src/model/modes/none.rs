@@ -9,8 +9,7 @@ const LEAST: f64 = 3.0;
 /// Why no pole is a mode: which criteria keep the strongest complex pair out and what lets it in, or that all poles are
 /// real, with their time constants.
 pub(super) fn no_mode(poles: &[Pole], criteria: &ModeCriteria) -> String {
-    let pairs = poles.iter().filter(|pole| matches!(pole.kind, PoleClass::Detector | PoleClass::Doubtful));
-    let pairs = pairs.filter(|pole| pole.root.is_complex());
+    let pairs = poles.iter().filter(|pole| pole.kind != PoleClass::Mechanical && pole.root.is_complex());
     // a pair that passes was left out for another reason, which is said elsewhere
     let strongest = pairs.filter(|pole| !barriers(pole, criteria).is_empty());
     let Some(pole) = strongest.max_by(|a, b| a.significance.total_cmp(&b.significance)) else {

@@ -47,3 +47,51 @@ fn static_shares_lie_within_errors_that_count_the_ambiguity_of_t0() {
         assert!(off > 10.0, "with a known t0 the error is far too small: {off}");
     }
 }
+
+/// A measured record of a second-order system of the given frequency in hertz and quality factor, at 100 Hz.
+fn driven(frequency_hz: f64, quality_factor: f64, seed: u64) -> afmid_pipeline::Array {
+    use afmid_pipeline::{Array, Axis};
+    let turn = std::f64::consts::TAU * frequency_hz / 100.0;
+    let fall = (-0.5 * turn / quality_factor).exp();
+    let damped = turn * (1.0 - 0.25 / quality_factor.powi(2)).sqrt();
+    let (input, noise) = (white_noise(4000, 1.0, seed), white_noise(4000, 0.05, seed + 1));
+    let mut y = vec![0.0; 4000];
+    for k in 2..4000 {
+        y[k] = 2.0 * fall * damped.cos() * y[k - 1] - fall * fall * y[k - 2] + turn * turn * input[k - 1];
+    }
+    let output: Vec<f64> = y.iter().zip(noise).map(|(y, e)| y + 0.2 * turn * e).collect();
+    let time = (0..4000).map(|k| f64::from(k) / 100.0).collect();
+    Array::over(vec![Axis::new("time", "s", "time", time)])
+        .with("response", "rad", "", &["time"], output)
+        .with("force", "V", "", &["time"], input)
+        .attribute("sample_rate_hz", 100.0)
+        .attribute("t0_sample", 0_usize)
+}
+
+/// A propeller's pendulum has a quality factor of 2 or 3: no mode of a lever, and no detector either.
+#[test]
+fn what_oscillates_strongly_damped_is_listed_apart_with_its_error() {
+    use crate::model::order::Order;
+    use crate::model::{Modes, Pem};
+    use afmid_pipeline::{Array, Context, Document, Port, Ports, Stage, StateSpace};
+    const MODEL: Port<StateSpace> = Port::new("model", "model", "");
+    const PAIR: Port<Array> = Port::new("pair", "pair", "");
+    const SUMMARY: Port<Document> = Port::new("summary", "summary", "");
+    for (seed, (frequency, quality)) in [(1.8, 2.6), (4.1, 1.2), (9.0, 3.9), (0.9, 4.4)].into_iter().enumerate() {
+        let pair = driven(frequency, quality, 40 + 2 * seed as u64);
+        let stage = Pem { order: Order::Fixed(2), ..Pem::default() };
+        let fitted = stage.run(&Ports::new().with(&PAIR, pair.clone()), &Context::alone(0)).unwrap();
+        let inputs = Ports::new().with(&MODEL, fitted.get(&MODEL).unwrap().clone()).with(&PAIR, pair);
+        let found = Modes::default().run(&inputs, &Context::alone(0)).unwrap();
+        let summary = &found.get(&SUMMARY).unwrap().0;
+        assert!(summary["modes"].as_array().unwrap().is_empty(), "{summary}");
+        let [damped] = &summary["damped"].as_array().unwrap()[..] else { panic!("{quality}: {summary}") };
+        for (name, std, truth) in
+            [("frequency_hz", "frequency_std_hz", frequency), ("quality_factor", "quality_factor_std", quality)]
+        {
+            let off = (damped[name].as_f64().unwrap() - truth) / damped[std].as_f64().unwrap();
+            // eight numbers, of which none is beyond four errors but once in two thousand times
+            assert!(off.abs() < 4.0, "{name} of {truth}: {damped}");
+        }
+    }
+}
