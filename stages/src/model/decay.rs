@@ -9,7 +9,7 @@ use afmid_pipeline::{Array, Context, Document, Example, Port, Ports, Spec, Stage
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use self::course::Parts;
+use self::course::{Parts, sidebands};
 use self::systems::Systems;
 use self::tables::{fit_array, hit_table, modes_with_lack, summary};
 use super::count::Count;
@@ -112,7 +112,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 9,
+        version: 10,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
@@ -142,6 +142,7 @@ impl Stage for DecayFit {
                  are left out: `summary` lists them under `dropped`"
             ));
         }
+        sidebands(&followed).into_iter().for_each(|warning| cx.warn(warning));
         let channels: Vec<&str> = decays.sensors.iter().map(|sensor| sensor.name.as_str()).collect();
         parts.warnings().into_iter().for_each(|warning| cx.warn(warning));
         Ok(Ports::new()

@@ -167,15 +167,40 @@ pub(super) fn digits(estimate: Estimate, factor: f64) -> String {
     format!("{:.decimals$}", factor * estimate.value)
 }
 
+/// That lines are left out which a disturbed gain or clock makes of a mode; none where there are none.
+pub(super) fn sidebands(followed: &FollowedDecay) -> Option<String> {
+    let modes = followed.fit.modes();
+    let sideband = |dropped: &DroppedMode| match dropped.reason {
+        Dropped::Sideband { of, order } => {
+            let mode = modes.get(of)?.frequency_hz.value;
+            Some((of, (dropped.mode.frequency_hz.value - mode) / f64::from(order)))
+        }
+        _ => None,
+    };
+    let mut spacings: Vec<f64> = followed.dropped.iter().filter_map(sideband).map(|(_, spacing)| spacing).collect();
+    let (of, _) = followed.dropped.iter().find_map(sideband)?;
+    spacings.sort_by(f64::total_cmp);
+    let spacing_hz = spacings[spacings.len() / 2];
+    Some(format!(
+        "{} weak lines at equal distances of {spacing_hz:.4} Hz on both sides of mode {} are left out: sidebands, of a gain \
+         or a sample clock that is disturbed every {:.4} s; are samples lost or doubled?",
+        spacings.len(),
+        of + 1,
+        1.0 / spacing_hz
+    ))
+}
+
 /// What was fitted and is no mode.
 pub(super) fn dropped_document(dropped: &[DroppedMode]) -> Value {
     let row = |dropped: &DroppedMode| {
         let (reason, of, mac) = match dropped.reason {
             Dropped::Steady => ("steady", None, None),
             Dropped::Broad => ("broad", None, None),
+            Dropped::Brief => ("brief", None, None),
             Dropped::Undetermined => ("undetermined", None, None),
             Dropped::Companion { of, mac } => ("companion", Some(of + 1), Some(mac)),
             Dropped::Harmonic { of, .. } => ("harmonic", Some(of + 1), None),
+            Dropped::Sideband { of, .. } => ("sideband", Some(of + 1), None),
         };
         json!({
             "frequency_hz": dropped.mode.frequency_hz.value,

@@ -14,6 +14,8 @@ pub enum Dropped {
     /// Its quality factor is not above `1/sqrt(2)` at the 0.1 % level: its response has no maximum. A drift, a coupling
     /// capacitor or what the model lacks, fitted along with the modes.
     Broad,
+    /// It dies away within three samples: a filter of the recorder or the end of a hit looks the same.
+    Brief,
     /// The fit leaves more than noise round it, and with errors that count that its damping is not above zero at the
     /// 0.1 % level: what another mode lacks, or a mode of which nothing is known.
     Undetermined,
@@ -31,6 +33,14 @@ pub enum Dropped {
         of: usize,
         /// 2 or 3.
         multiple: usize,
+    },
+    /// One of several weak lines at equal distances on both sides of a mode, of its shape: a gain or a clock is disturbed
+    /// again and again.
+    Sideband {
+        /// Number of that mode, from 0, among the modes that are left.
+        of: usize,
+        /// Multiple of the distance.
+        order: i32,
     },
 }
 
@@ -86,6 +96,15 @@ pub(super) fn broad(fit: &ChannelRingdown) -> Vec<usize> {
     (0..fit.poles.len()).filter(|&j| faster(j).is_nan() || faster(j) < DETERMINED).collect()
 }
 
+/// Samples in which a mode dies away by 1/e, at least. Why: a converter's filter answers over as many.
+const LEAST_TIME_CONSTANT_SAMPLES: f64 = 3.0;
+
+/// Modes that die away within few samples, by number.
+pub(super) fn brief(fit: &ChannelRingdown, interval_s: f64) -> Vec<usize> {
+    let samples = |j: usize| 1.0 / (-fit.poles[j].re * interval_s);
+    (0..fit.poles.len()).filter(|&j| fit.poles[j].re < 0.0 && samples(j) < LEAST_TIME_CONSTANT_SAMPLES).collect()
+}
+
 /// Companions with the mode of each, and the modal assurance criterion between them.
 ///
 /// # Model
@@ -106,7 +125,7 @@ pub(super) fn companions(fit: &ChannelRingdown) -> Vec<(usize, usize, f64)> {
             let (a, b) = (fit.poles[i], fit.poles[**j]);
             let error = |k: usize| fit.covariance[(2 * k, 2 * k)].max(0.0).sqrt();
             let faster = -a.re + 2.0 * error(i).hypot(2.0 * error(**j)) >= -2.0 * b.re;
-            (a.im - b.im).abs() < a.re.abs() && faster && one_shape(fit, i, **j)
+            (a.im - b.im).abs() < a.re.abs() && faster && alike(fit, i, **j, ORTHOGONAL.0)
         };
         match kept.iter().filter(belongs).max_by(|a, b| energy[**a].total_cmp(&energy[**b])) {
             Some(&j) => found.push((i, j, fit.shapes[i].mac(&fit.shapes[j]))),
@@ -116,8 +135,9 @@ pub(super) fn companions(fit: &ChannelRingdown) -> Vec<(usize, usize, f64)> {
     found
 }
 
-/// Whether two shapes are one, each channel in units of its noise: the units of the channels then do not matter.
-fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
+/// Whether two shapes are one but for a share of `orthogonal` of their energy, each channel in units of its noise: the units
+/// of the channels then do not matter.
+pub(super) fn alike(fit: &ChannelRingdown, i: usize, j: usize, orthogonal: f64) -> bool {
     let weighted = |k: usize| {
         let mut shape = fit.shapes[k].clone();
         for (point, noise) in shape.points.iter_mut().zip(&fit.noise) {
@@ -133,7 +153,7 @@ fn one_shape(fit: &ChannelRingdown, i: usize, j: usize) -> bool {
     };
     let (one, other) = (weighted(i), weighted(j));
     let apart = 1.0 - one.mac(&other);
-    apart < ORTHOGONAL.0 + ORTHOGONAL.1 * (noise(&one, i) + noise(&other, j))
+    apart < orthogonal + ORTHOGONAL.1 * (noise(&one, i) + noise(&other, j))
 }
 
 /// Largest multiple that is looked for: cubes and squares of the response make the first few.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use faer::c64;
 
-use super::companions::{Dropped, DroppedMode, broad, companions, energies, steady, undetermined};
+use super::companions::{Dropped, DroppedMode, brief, broad, companions, energies, steady, undetermined};
 use super::laws::{AmplitudeCourse, LawFit, OneLine, follow_laws, oscillations};
 use super::levels::density;
 use super::options::{ChannelOptions, ModesWanted};
@@ -141,10 +141,11 @@ pub fn follow_channels(
     if fixed || motion != Motion::Laws {
         return linear(&[]);
     }
-    match linear(&[]) {
-        Ok(found) => follow_laws(&records, found, &linear),
-        Err(error) => oscillations(&records).ok_or(error),
-    }
+    let found = match linear(&[]) {
+        Ok(found) => follow_laws(&records, found, &linear)?,
+        Err(error) => oscillations(&records).ok_or(error)?,
+    };
+    Ok(found.without_sidebands(&all))
 }
 
 /// The same of modes that are linear in each part; of the exponentials of `one_line` the strongest alone is a mode.
@@ -156,7 +157,7 @@ fn follow_linear(
 ) -> Result<FollowedDecay, ModelError> {
     let LawFit { all, events, interval_s, options } = *records;
     let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
-    let no_modes = if fixed { Vec::new() } else { no_modes(all, longest as f64 * interval_s)? };
+    let no_modes = if fixed { Vec::new() } else { no_modes(all, interval_s, longest)? };
     let mut dropped: Vec<DroppedMode> = no_modes.iter().map(|(_, mode)| *mode).collect();
     let gone: Vec<usize> = no_modes.iter().map(|(j, _)| *j).collect();
     let mut fit = all.without(&gone);
@@ -205,20 +206,24 @@ fn follow_linear(
     Ok(FollowedDecay { fit, whole: whole_fit, fitted: all.clone(), dropped, course, along, residuals })
 }
 
-/// Fitted exponentials that are no modes, by number: lines that do not die away, what has no maximum in its response.
-/// Errors: all are.
-fn no_modes(all: &ChannelRingdown, duration_s: f64) -> Result<Vec<(usize, DroppedMode)>, ModelError> {
-    let (still, wide) = (steady(all, duration_s), broad(all));
+/// Fitted exponentials that are no modes, by number: lines that do not die away, what has no maximum in its response or
+/// dies away at once. Errors: all are.
+fn no_modes(all: &ChannelRingdown, interval_s: f64, samples: usize) -> Result<Vec<(usize, DroppedMode)>, ModelError> {
+    let (still, wide, short) = (steady(all, samples as f64 * interval_s), broad(all), brief(all, interval_s));
     let modes = all.modes();
-    let reason = |j: usize| match (still.contains(&j), wide.contains(&j)) {
-        (true, _) => Some(Dropped::Steady),
-        (false, true) => Some(Dropped::Broad),
+    let reason = |j: usize| match [&still, &wide, &short].map(|numbers| numbers.contains(&j)) {
+        [true, ..] => Some(Dropped::Steady),
+        [_, true, _] => Some(Dropped::Broad),
+        [.., true] => Some(Dropped::Brief),
         _ => None,
     };
     let dropped = |j: usize| Some((j, DroppedMode { mode: modes[j], reason: reason(j)? }));
     let found: Vec<(usize, DroppedMode)> = (0..modes.len()).filter_map(dropped).collect();
-    let why =
-        if still.is_empty() { "overdamped: no quality factor above 0.71" } else { "no oscillation that dies away" };
+    let why = match (still.is_empty(), short.is_empty()) {
+        (false, _) => "no oscillation that dies away",
+        (_, false) => "what oscillates dies away within three samples: record it at a higher rate",
+        _ => "overdamped: no quality factor above 0.71",
+    };
     if found.len() == modes.len() { Err(ModelError::Degenerate(why)) } else { Ok(found) }
 }
 

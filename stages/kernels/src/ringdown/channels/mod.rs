@@ -29,6 +29,7 @@ mod recursion;
 mod result;
 mod rows;
 mod shape;
+mod sidebands;
 mod systems;
 #[cfg(test)]
 mod systems_tests;

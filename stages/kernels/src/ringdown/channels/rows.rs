@@ -230,7 +230,9 @@ impl<'a> Rows<'a> {
         let number = |tag: usize| order.iter().position(|&at| self.tags[at] == tag);
         for dropped in &mut self.followed.dropped {
             match &mut dropped.reason {
-                Dropped::Companion { of, .. } | Dropped::Harmonic { of, .. } => *of = number(*of).unwrap_or(0),
+                Dropped::Companion { of, .. } | Dropped::Harmonic { of, .. } | Dropped::Sideband { of, .. } => {
+                    *of = number(*of).unwrap_or(0);
+                }
                 _ => {}
             }
         }
