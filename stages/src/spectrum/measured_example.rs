@@ -1,4 +1,4 @@
-//! Examples of `spectrum.measured_frf`: a pole driven by a steady signal, and a hammer's hits.
+//! Examples of `spectrum.measured_frf`: a pole driven by a steady signal, by one that repeats itself, and by a hammer.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -28,6 +28,12 @@ pub(super) fn examples() -> Vec<Example> {
             params: "blocks = \"hits\"\nblock_samples = 600\nadded_decay_per_s = 5.0\nquantity = \"mobility\"\ndriving_point = 1",
             inputs: || Ok(Ports::new().with(&PAIR, struck())),
             expect: |outputs| near_truth(outputs, 5.0),
+        },
+        Example {
+            title: "an input that repeats itself, whose period is found",
+            params: "blocks = \"periods\"",
+            inputs: || Ok(Ports::new().with(&PAIR, repeated())),
+            expect: |outputs| near_truth(outputs, 0.0),
         },
         Example {
             title: "a second point joins the first",
@@ -79,6 +85,12 @@ pub(super) fn pair(force: Vec<f64>, level: f64, labels: [(&str, &str); 2]) -> Ar
 
 fn steady() -> Array {
     pair(noise(8192, 1), 0.5, LABELS)
+}
+
+/// Seven periods of 600 samples.
+fn repeated() -> Array {
+    let period = noise(600, 3);
+    pair((0..4200).map(|k| period[k % 600]).collect(), 0.5, LABELS)
 }
 
 /// Two responses, of one record twice.

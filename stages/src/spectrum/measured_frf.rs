@@ -12,7 +12,7 @@ use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Under
 use crate::io::{FRF, Roving, same_values, varies};
 use afmid_kernels::spectra::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, common_hit_samples, frequency_response,
-    hit_spacing, hits, segments, with_hits,
+    hit_spacing, hits, period_samples, periods, segments, with_hits,
 };
 
 /// Frequency response from measured input and output, averaged over hits or segments.
@@ -20,7 +20,8 @@ use afmid_kernels::spectra::{
 /// # Model
 /// The system is linear; noise of the output (`h1`), of the input (`h2`) or of both (`hv`) is independent of the input.
 /// # Method
-/// Auto and cross spectra over blocks: half-overlapping Hann segments of the record, or hits of a hammer. `h1` is
+/// Auto and cross spectra over blocks: half-overlapping Hann segments of the record, periods of an input that repeats itself,
+/// or hits of a hammer. `h1` is
 /// `Syu / Suu`, `h2` is `Syy / Suy`, `hv` their geometric mean; several inputs: `h1 = Syu Suu^-1`. Offsets are removed.
 /// The band in which the input has power is found and kept. Of several records (`files` of `io.columns`) the blocks of each
 /// are averaged, none over the end of one; a record without a hit is left out. Two responses with equal values are one
@@ -45,11 +46,11 @@ use afmid_kernels::spectra::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MeasuredFrf {
-    /// What is averaged: `segments` of a steady excitation, or `hits` of a hammer. Why: a record from columns is most
-    /// often of the first kind.
+    /// What is averaged: `segments` of a steady excitation, `periods` of one that repeats itself, or `hits` of a hammer. Why:
+    /// a record from columns is most often of the first kind.
     pub blocks: BlocksAre,
-    /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), as many
-    /// as hits are apart at least, the whole record for a single hit, to the end of the shortest for a record each. With
+    /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), the
+    /// period that the inputs show, as many as hits are apart at least, the whole record for a single hit, to the end of the shortest for a record each. With
     /// `before`, as many as its blocks have.
     #[schemars(range(min = 8))]
     pub block_samples: Option<usize>,
@@ -96,6 +97,9 @@ pub enum BlocksAre {
     Segments,
     /// Hits, each with what rings after it.
     Hits,
+    /// Periods of an input that repeats itself, without a window; the first of three and more is left out, for the response
+    /// settles in it. Only the input's lines are kept.
+    Periods,
 }
 
 /// Which noise the estimate is free of.
@@ -184,7 +188,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 6,
+        version: 7,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec(), BEFORE.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -195,7 +199,8 @@ impl Stage for MeasuredFrf {
     fn check(&self, faults: &mut Faults) {
         let of_hits = self.force_window_s.is_some() || self.added_decay_per_s != 0.0;
         faults.require(self.blocks == BlocksAre::Hits || !of_hits, || {
-            "`force_window_s` and `added_decay_per_s` are for `blocks = \"hits\"`: segments are under a Hann window"
+            "`force_window_s` and `added_decay_per_s` are for `blocks = \"hits\"`: segments are under a Hann window, \
+             periods under none"
                 .to_owned()
         });
         if let Some([low, high]) = self.band_hz {
@@ -219,13 +224,13 @@ impl Stage for MeasuredFrf {
         if found.coherence.is_none() {
             cx.warn("a single block: neither coherence nor variance is known");
         }
-        let band = self.band(&found)?;
+        let kept = self.kept(&found)?;
         let [force_unit, response_unit] = pair.units()?;
         let understood = Understood::new(self.quantity, &unit_ratio(response_unit, force_unit))?;
         understood.remark.iter().for_each(|remark| cx.warn(remark));
-        let summary = self.summary(&found, band, blocks.len())?;
+        let summary = self.summary(&found, &kept, blocks.len())?;
         let responses = self.responses(pair.channel_names(record.inputs.len(), record.outputs.len()))?;
-        let mut frf = self.frf(found, band, responses, understood, rate)?;
+        let mut frf = self.frf(found, &kept, responses, understood, rate)?;
         if let Some(before) = before {
             frf = before.join(frf)?;
             before.remark(&frf).into_iter().for_each(|remark| cx.warn(remark));
@@ -248,6 +253,14 @@ impl MeasuredFrf {
     ) -> Result<(Vec<Block<'a>>, Option<String>), StageError> {
         let length = |record: &Block<'_>| record.outputs.first().map_or(0, |output| output.len());
         let all = |found: Result<Vec<Vec<Block<'a>>>, _>| found.map_err(StageError::from_error);
+        if self.blocks == BlocksAre::Periods {
+            let samples = match samples {
+                Some(samples) => samples,
+                None => self.period(records)?,
+            };
+            let found = all(records.iter().map(|record| periods(record, samples)).collect())?;
+            return Ok((found.concat(), None));
+        }
         if self.blocks == BlocksAre::Segments {
             let samples = samples.unwrap_or_else(|| records.iter().map(length).min().unwrap_or(0) / EIGHTH);
             let found = all(records.iter().map(|record| segments(record, samples)).collect())?;
@@ -283,9 +296,24 @@ impl MeasuredFrf {
         Ok((found.concat(), left_out))
     }
 
+    /// Samples of the period that all records have. Errors: they do not repeat themselves, or with unlike periods.
+    fn period(&self, records: &[Block<'_>]) -> Result<usize, StageError> {
+        let found: Vec<Option<usize>> = records.iter().map(|record| period_samples(&record.inputs)).collect();
+        let help = "give `block_samples`, the samples of a period, or `blocks = \"segments\"`";
+        match found[..] {
+            [Some(first), ref rest @ ..] if rest.iter().all(|other| *other == Some(first)) => Ok(first),
+            [Some(first), ..] => Err(StageError::new(format!(
+                "the input of the first record repeats itself every {first} samples, that of another one does not"
+            ))
+            .help(help)),
+            _ => Err(StageError::new("the input does not repeat itself").help(help)),
+        }
+    }
+
     fn settings(&self, sample_rate_hz: f64) -> ResponseSettings {
         let kind = match self.blocks {
             BlocksAre::Segments => BlockKind::Segments,
+            BlocksAre::Periods => BlockKind::Periods,
             BlocksAre::Hits => BlockKind::Hits {
                 force_window: self.force_window_s.map(|time| (time * sample_rate_hz).round() as usize),
                 added_decay_per_s: self.added_decay_per_s,
@@ -295,8 +323,8 @@ impl MeasuredFrf {
         ResponseSettings { sample_rate_hz, estimator, kind, excited_share }
     }
 
-    /// First bin that is kept, and one past the last. Errors: none is.
-    fn band(&self, found: &MeasuredResponse) -> Result<(usize, usize), StageError> {
+    /// Bins that are kept, ascending. Errors: fewer than two.
+    fn kept(&self, found: &MeasuredResponse) -> Result<Vec<usize>, StageError> {
         let common = found
             .excited_hz
             .iter()
@@ -305,8 +333,10 @@ impl MeasuredFrf {
         // zero hertz holds what is left of the offset
         let first = found.frequency_hz.partition_point(|f| *f < low).max(1);
         let end = found.frequency_hz.partition_point(|f| *f <= high);
-        match first + 1 < end {
-            true => Ok((first, end)),
+        let is_line = |bin: &usize| found.lines.as_ref().is_none_or(|lines| lines[*bin]);
+        let kept: Vec<usize> = (first..end).filter(is_line).collect();
+        match kept.len() >= 2 {
+            true => Ok(kept),
             false => Err(StageError::new(format!("no two bins lie between {low} and {high} Hz"))
                 .help("give `band_hz`, or longer blocks")),
         }
@@ -336,23 +366,23 @@ impl MeasuredFrf {
     fn frf(
         &self,
         found: MeasuredResponse,
-        (first, end): (usize, usize),
+        bins: &[usize],
         responses: Vec<ResponseOf>,
         Understood { quantity, unit, factor, .. }: Understood,
         rate: f64,
     ) -> Result<NewFrf, StageError> {
         let kept = |rows: Vec<Vec<f64>>, factor: f64| -> Vec<f64> {
-            rows.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect()
+            rows.iter().flat_map(|row| bins.iter().map(|&bin| row[bin] * factor)).collect()
         };
         let transfer: Vec<Complex64> =
-            found.transfer.iter().flat_map(|row| row[first..end].iter().map(|value| value * factor)).collect();
+            found.transfer.iter().flat_map(|row| bins.iter().map(|&bin| row[bin] * factor)).collect();
         // the multiple coherence of an output is that of each input
         let inputs = responses.len() / found.coherence.as_ref().map_or(1, |rows| rows.len().max(1));
         let of_each = |row| std::iter::repeat_n(row, inputs);
         let noise = found.input_noise.map(|row| kept(vec![row; responses.len()], 1.0));
         let coherence = found.coherence.map(|rows| kept(rows.into_iter().flat_map(of_each).collect(), 1.0));
         Ok(NewFrf {
-            frequency_hz: found.frequency_hz[first..end].to_vec(),
+            frequency_hz: bins.iter().map(|&bin| found.frequency_hz[bin]).collect(),
             responses,
             frf: transfer,
             variance: found.variance.map(|rows| kept(rows, factor * factor)),
@@ -367,15 +397,10 @@ impl MeasuredFrf {
         })
     }
 
-    fn summary(
-        &self,
-        found: &MeasuredResponse,
-        (first, end): (usize, usize),
-        blocks: usize,
-    ) -> Result<Document, StageError> {
+    fn summary(&self, found: &MeasuredResponse, bins: &[usize], blocks: usize) -> Result<Document, StageError> {
         let middle = found.coherence.as_ref().map(|rows| {
-            let all = rows.iter().flat_map(|row| &row[first..end]);
-            let mut values: Vec<f64> = all.copied().filter(|value| value.is_finite()).collect();
+            let all = rows.iter().flat_map(|row| bins.iter().map(|&bin| row[bin]));
+            let mut values: Vec<f64> = all.filter(|value| value.is_finite()).collect();
             values.sort_by(f64::total_cmp);
             values.get(values.len() / 2).copied()
         });
@@ -384,8 +409,8 @@ impl MeasuredFrf {
             "averages": found.averages,
             // bins begin at zero hertz
             "bin_width_hz": found.frequency_hz.get(1),
-            "lowest_hz": found.frequency_hz[first],
-            "highest_hz": found.frequency_hz[end - 1],
+            "lowest_hz": bins.first().map(|&bin| found.frequency_hz[bin]),
+            "highest_hz": bins.last().map(|&bin| found.frequency_hz[bin]),
             "excited_hz": found.excited_hz,
             "median_coherence": middle.flatten(),
             "force_window_found": found.windowed_before,

@@ -75,7 +75,8 @@ pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
 pub use measured_input::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, chance_coherence, common_hit_samples,
-    frequency_response, half_energy_samples, hit_begins, hit_spacing, hits, is_impulsive, segments, with_hits,
+    excited_share, frequency_response, half_energy_samples, hit_begins, hit_spacing, hits, is_impulsive, period_samples,
+    periods, segments, with_hits,
 };
 pub use neighbour_scatter::neighbour_scatter;
 pub use neighbours::{Bins, Smoothed, SuppressedLine};

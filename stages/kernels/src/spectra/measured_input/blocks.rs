@@ -26,6 +26,8 @@ pub enum BlockKind {
     },
     /// Segments of a long record, each overlapping the next by half; a Hann window is put on them.
     Segments,
+    /// Whole periods of an input that repeats itself, the response settled: no window.
+    Periods,
 }
 
 /// The sample in which the first hit begins: the force comes to the share `level` of its largest value about its median.
@@ -75,7 +77,7 @@ pub(super) struct Prepared {
 }
 
 /// Samples that a block has at least.
-const LEAST_SAMPLES: usize = 8;
+pub(super) const LEAST_SAMPLES: usize = 8;
 
 /// The segments of a record: as many samples each, every one beginning in the middle of that before.
 ///
@@ -198,6 +200,10 @@ impl Prepared {
         let windowed_before = block.inputs.iter().all(|input| is_windowed(input));
         let prepare = |values: &[f64], is_input: bool| match kind {
             BlockKind::Segments => without_mean(values),
+            BlockKind::Periods => {
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                values.iter().map(|value| value - mean).collect()
+            }
             BlockKind::Hits { force_window, added_decay_per_s } => {
                 let offset = median(&mut values.to_vec());
                 let mut values: Vec<f64> = values.iter().map(|value| value - offset).collect();

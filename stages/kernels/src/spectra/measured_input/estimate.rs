@@ -64,6 +64,8 @@ pub struct MeasuredResponse {
     pub averages: f64,
     /// Lowest and highest bin, in hertz, of the band around each input's strongest one in which it is excited.
     pub excited_hz: Vec<[f64; 2]>,
+    /// Of a periodic input whether each bin is one of its lines, of all inputs; none of other blocks.
+    pub lines: Option<Vec<bool>>,
     /// Whether inputs were under a force window when they were recorded: the same number for half of the samples.
     pub windowed_before: bool,
 }
@@ -78,7 +80,8 @@ pub struct MeasuredResponse {
 /// Means over blocks of `U U*`, `Y U*` and `|Y|^2`. One input: `H1 = Syu / Suu`, `H2 = Syy / Suy`, `Hv = H1 / abs(gamma)`
 /// with `gamma^2 = |Syu|^2 / (Suu Syy)`. Several inputs: `H1 = Syu Suu^-1`. Offsets are removed: a segment's mean, a
 /// hit's median (the signal rests for most of it). The exponential window is put on inputs and outputs alike, which moves
-/// each pole by `-d` and leaves the ratio exact: a fit subtracts `d` from the decay rates that it finds. The noise of
+/// each pole by `-d` and leaves the ratio exact: a fit subtracts `d` from the decay rates that it finds. Periods are
+/// transformed without a window: their lines are exact, what differs between them is noise. The noise of
 /// which variances are is smooth over neighbouring bins, as many as give 160 degrees of freedom: of `H1` of hits that of
 /// the output and the square of the response times that of the input, which the peaks show, else its mean share of the
 /// power. So weights and intervals of fits are right with few blocks, too. Errors of several outputs to one input have the input's
@@ -118,7 +121,7 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
     let count = blocks.len() as f64;
     let averages = match settings.kind {
         BlockKind::Segments => count * count / (count + (count - 1.0) / 18.0),
-        BlockKind::Hits { .. } => count,
+        BlockKind::Hits { .. } | BlockKind::Periods => count,
     };
     let (inputs, outputs) = (sums.inputs, sums.outputs);
     let bins = frequency_hz.len();
@@ -129,9 +132,18 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
         coherence: (blocks.len() > inputs).then(|| vec![Vec::with_capacity(bins); outputs]),
         averages,
         excited_hz: sums.excited(&frequency_hz, settings.excited_share),
+        lines: None,
         windowed_before: sums.windowed_before,
         frequency_hz,
     };
+    if settings.kind == BlockKind::Periods {
+        let lines = sums.lines(settings.excited_share);
+        if let Some(bands) = bands(&lines, &found.frequency_hz) {
+            found.excited_hz = vec![bands; inputs];
+        }
+        found.lines = Some(lines);
+    }
+    let is_line = |bin: usize, found: &MeasuredResponse| found.lines.as_ref().is_none_or(|lines| lines[bin]);
     let mut noise = vec![Vec::with_capacity(bins); outputs];
     let mut gain = vec![Vec::with_capacity(bins); outputs];
     let mut scale = vec![Vec::with_capacity(bins); inputs * outputs];
@@ -139,7 +151,9 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
         let inverse = sums.inverse(bin);
         for output in 0..outputs {
             let at = At { sums: &sums, inverse: inverse.as_deref(), bin, output };
-            noise[output].push(at.put(settings.estimator, &mut found, &mut scale));
+            let own = at.put(settings.estimator, &mut found, &mut scale);
+            // between the lines is what the system adds to them, too
+            noise[output].push(if is_line(bin, &found) { own } else { f64::NAN });
             let own = &found.transfer[output * inputs..(output + 1) * inputs];
             gain[output].push(own.iter().map(|row| row[bin].norm_sqr()).sum());
         }
@@ -164,6 +178,12 @@ pub fn frequency_response(blocks: &[Block<'_>], settings: ResponseSettings) -> R
         }
     }
     Ok(found)
+}
+
+/// Lowest and highest frequency of the lines; none of none.
+fn bands(lines: &[bool], frequency_hz: &[f64]) -> Option<[f64; 2]> {
+    let at = |bin: Option<usize>| bin.and_then(|bin| frequency_hz.get(bin).copied());
+    Some([at(lines.iter().position(|line| *line))?, at(lines.iter().rposition(|line| *line))?])
 }
 
 /// Least share of an output's power that no input explains: what rounding leaves of the sums.
@@ -252,6 +272,17 @@ impl Sums {
             [frequency_hz[low], frequency_hz[high]]
         };
         (0..self.inputs).map(band).collect()
+    }
+
+    /// Whether each bin has the share of the power of the strongest one of every input; not zero hertz, which holds what is
+    /// left of the offset.
+    fn lines(&self, share: f64) -> Vec<bool> {
+        let own = |input: usize| self.power[input * self.inputs + input].iter().map(|bin| bin.re).collect::<Vec<f64>>();
+        let powers: Vec<Vec<f64>> = (0..self.inputs).map(own).collect();
+        let peaks: Vec<f64> = powers.iter().map(|power| power.iter().skip(1).copied().fold(0.0, f64::max)).collect();
+        let bins = powers.first().map_or(0, Vec::len);
+        let is_line = |bin: usize| bin > 0 && powers.iter().zip(&peaks).all(|(power, peak)| power[bin] >= share * peak);
+        (0..bins).map(is_line).collect()
     }
 
     /// What one input leaves of each pair of outputs: `Y_o Y_p* - H_o H_p* |U|^2`.

@@ -1,11 +1,13 @@
 //! Frequency responses from input and output that were both measured.
 //!
-//! [`frequency_response`] averages blocks: hits of a hammer, or the segments of a long record ([`hits`], [`segments`]).
+//! [`frequency_response`] averages blocks: hits of a hammer, the segments of a long record, the periods of an input that
+//! repeats itself ([`hits`], [`segments`], [`periods`]).
 
 mod blocks;
 mod estimate;
 mod follows;
 mod noise;
+mod periods;
 #[cfg(test)]
 mod tests;
 
@@ -15,3 +17,4 @@ pub use blocks::{
 };
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
 pub use follows::chance_coherence;
+pub use periods::{excited_share, period_samples, periods};

@@ -20,7 +20,7 @@ pub(super) fn width(kind: BlockKind, freedom: f64) -> usize {
     // a Hann window makes neighbours alike
     let alike = match kind {
         BlockKind::Segments => 2.0,
-        BlockKind::Hits { .. } => 1.0,
+        BlockKind::Hits { .. } | BlockKind::Periods => 1.0,
     };
     (alike * POOLED / (2.0 * freedom)).ceil() as usize
 }
