@@ -3,8 +3,8 @@
 /// What stands in the place of a number that says nothing.
 pub const UNDETERMINED: &str = "undetermined";
 
-/// Words of names of what is above zero; of zeros in the right half plane below it.
-const ABOVE_ZERO: [&str; 4] = ["frequency", "quality_factor", "damping_ratio", "decay_rate"];
+/// Names of what is above zero; of zeros in the right half plane below it.
+const ABOVE_ZERO: [&str; 5] = ["frequency", "frequency_hz", "quality_factor", "damping_ratio", "decay_rate"];
 
 /// Whether a quantity that is not zero is known: its standard error is smaller than itself. Without an error it is.
 pub fn is_determined(value: f64, std: f64) -> bool {
@@ -13,8 +13,7 @@ pub fn is_determined(value: f64, std: f64) -> bool {
 
 /// Whether the value of that name is known; what may be negative (differences, shares, parts of shapes) always is.
 pub fn says(name: &str, value: f64, std: f64) -> bool {
-    let above_zero = ABOVE_ZERO.iter().any(|word| name.starts_with(word)) && !name.contains("difference");
-    !above_zero || is_determined(value, std)
+    !ABOVE_ZERO.contains(&name) || is_determined(value, std)
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ pub fn ringdown(found: &FoundChannel) -> (Answer, String) {
 
 fn of_search(search: &DecaySearch, rate: f64, since: usize) -> (Answer, String) {
     match (search.decays.first(), search.reason()) {
-        (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
+        (None, _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
             let start_s = (since + first.range.start) as f64 / rate;
             let (frequency, samples) = (first.frequency_hz, rate / first.frequency_hz);
@@ -82,7 +82,7 @@ pub const NO_RATE: &str = "the file states no sample rate";
 fn without_rate(search: &DecaySearch, since: usize) -> (Answer, String) {
     let unknown = format!("{NO_RATE}: give `sample_rate_hz`");
     match (search.decays.first(), search.steady.first()) {
-        (Some(_), _) if search.random => (Answer::No, RANDOM.to_owned()),
+        (None, _) if search.random => (Answer::No, RANDOM.to_owned()),
         (Some(first), _) => {
             let (start, samples) = (since + first.range.start, 1.0 / first.frequency_hz);
             let from = format!("from sample {start} on, {samples:.1} samples a period");

@@ -1,7 +1,7 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::harmonics::is_tone;
-use afmid_kernels::spectra::{is_impulsive, shows_resonance};
+use afmid_kernels::spectra::{excited_share, is_impulsive, period_samples, rings_on, shows_resonance};
 use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
@@ -29,10 +29,14 @@ pub struct Choice<'a> {
     pub channels: Vec<&'a Channel>,
     /// The measured inputs; of input and output alone.
     pub inputs: Vec<&'a Channel>,
+    /// The measured force whose hits begin free decays.
+    pub force: Option<&'a Channel>,
     /// The frequencies of a power density.
     pub frequencies: Option<&'a Channel>,
     /// Whether the input is a hammer's: short against the record.
     pub struck: bool,
+    /// Samples with which the input repeats itself.
+    pub period_samples: Option<usize>,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
@@ -44,8 +48,18 @@ pub struct Choice<'a> {
 impl<'a> Choice<'a> {
     /// Without a measured input.
     pub fn of(goal: Goal, channels: Vec<&'a Channel>, why: String) -> Self {
-        let (inputs, notes) = (Vec::new(), Vec::new());
-        Self { goal, channels, inputs, frequencies: None, struck: false, records_are: None, why, notes }
+        Self {
+            goal,
+            channels,
+            inputs: Vec::new(),
+            force: None,
+            frequencies: None,
+            struck: false,
+            period_samples: None,
+            records_are: None,
+            why,
+            notes: Vec::new(),
+        }
     }
 }
 
@@ -136,7 +150,17 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let best = source.best.and_then(|index| source.channels.get(index));
     let best = best.filter(|best| found.iter().any(|channel| channel.location == best.location));
     let outputs = if wanted.channels.is_empty() { like(&found, best.unwrap_or(found[0]), file) } else { found };
-    let several = struck || records_are.is_some() || outputs.len() > 1;
+    if goal.is_none()
+        && struck
+        && records_are.is_none()
+        && let Some(choice) = rings_into_the_next(file, wanted, inputs[0], &outputs)?
+    {
+        return Ok(choice);
+    }
+    let period_samples = if struck { None } else { repeats(file, &inputs) };
+    // a model of all frequencies would be one of what a part of the band says nothing of
+    let in_part = period_samples.is_some_and(|period| excites_a_part(file, inputs[0], period));
+    let several = struck || in_part || records_are.is_some() || outputs.len() > 1;
     let goal = goal.unwrap_or(if several { Goal::Frf } else { Goal::InputOutput });
     let names = |all: &[&Channel]| all.iter().map(|one| one.location.as_str()).collect::<Vec<&str>>().join(", ");
     if goal == Goal::InputOutput && outputs.len() > 1 {
@@ -144,7 +168,11 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
         let help = format!("say with --channel which one of {}; --goal frf takes all", names(&outputs));
         return Err((problem, Some(help)));
     }
-    let short = if struck { ", which is short as a hammer's," } else { "" };
+    let short = match (struck, period_samples) {
+        (true, _) => ", which is short as a hammer's,".to_owned(),
+        (_, Some(period)) => format!(", which repeats itself every {period} samples,"),
+        _ => String::new(),
+    };
     let (input, output) = (names(&inputs), names(&outputs));
     let hits = match (records_are, named_hits) {
         (Some(RecordsAre::Hits), true) => format!("; hits by the names of the {} files, averaged", source.files.len()),
@@ -154,7 +182,58 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let why = format!("measured input {input}{short} and output {output} in {}{hits}", source.name());
     let taken: Vec<&Channel> = outputs.iter().chain(&inputs).copied().collect();
     let notes = left_out(source, &taken).filter(|_| wanted.channels.is_empty()).into_iter().collect();
-    Ok(Choice { inputs, struck, records_are, notes, ..Choice::of(goal, outputs, why) })
+    Ok(Choice { inputs, struck, period_samples, records_are, notes, ..Choice::of(goal, outputs, why) })
+}
+
+/// Periods of an input at least: one settles, the others tell the noise.
+const LEAST_PERIODS: usize = 3;
+
+/// Samples with which a single input repeats itself often enough.
+fn repeats(file: &FirstFile<'_>, inputs: &[&Channel]) -> Option<usize> {
+    let [input] = inputs else { return None };
+    let values = file.samples(input).ok()?;
+    period_samples(&[&values]).filter(|period| LEAST_PERIODS * period <= values.len())
+}
+
+/// Share of the bins up to half the sample rate that a periodic input excites, below which its lines are looked at alone.
+const PART_OF_BAND: f64 = 0.5;
+
+fn excites_a_part(file: &FirstFile<'_>, input: &Channel, period: usize) -> bool {
+    file.samples(input).is_ok_and(|values| excited_share(&values[..period.min(values.len())]) < PART_OF_BAND)
+}
+
+/// Free decays where a structure still rings when a hit's block ends: responses by blocks would be of more than the block.
+fn rings_into_the_next<'a>(
+    file: &FirstFile<'a>,
+    wanted: &Wanted<'_>,
+    force: &'a Channel,
+    outputs: &[&'a Channel],
+) -> Result<Option<Choice<'a>>, Question> {
+    let values = outputs.iter().map(|channel| file.samples(channel)).collect::<Result<Vec<_>, _>>()?;
+    let rows: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
+    if file.hitting(outputs, wanted).is_none() {
+        return Ok(None);
+    }
+    let Some(share) = rings_on(&file.samples(force)?, &rows) else { return Ok(None) };
+    let (_, found) = file.search(outputs, Some(force), wanted)?;
+    if found.decays.is_empty() {
+        return Ok(None);
+    }
+    let decays = match found.decays.len() {
+        1 => "a free decay".to_owned(),
+        count => format!("{count} free decays"),
+    };
+    let names: Vec<&str> = outputs.iter().map(|channel| channel.location.as_str()).collect();
+    let why = format!(
+        "{} of {} in {}: {:.0} % of the amplitude is left where the next hit or the end comes, which frequency responses \
+         by blocks do not bear; --goal frf makes them all the same, --goal input-output fits {} to one of them",
+        decays,
+        names.join(", "),
+        file.source.name(),
+        100.0 * share,
+        force.location
+    );
+    Ok(Some(Choice { force: Some(force), ..Choice::of(Goal::Decay, outputs.to_vec(), why) }))
 }
 
 fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
@@ -167,6 +246,25 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
         }
     };
     Ok(Choice::of(goal, vec![channel], why))
+}
+
+/// Whether noise in any of the signals has a resonance in it.
+fn resonates(signals: &[Vec<f64>]) -> bool {
+    signals.iter().any(|values| shows_resonance(values, segment_samples(values.len())))
+}
+
+/// That several sensors move at random with no measured force.
+fn several_in_noise(source: &Source, channels: &[&Channel]) -> Question {
+    let (file, count) = (source.file.display(), channels.len());
+    let problem = format!(
+        "{file}: {count} sensors of a stationary random vibration and no measured force: no free decays, and the stage for \
+         modes under unmeasured forces is yet to come"
+    );
+    let help = format!(
+        "--goal thermal --channel {} fits the resonance in one sensor's spectrum; --input NAME names a measured force",
+        channels[0].location
+    );
+    (problem, Some(help))
 }
 
 fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result<Choice<'a>, Question> {
@@ -191,13 +289,11 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
     let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
-    let (values, found) = file.search(seen, wanted)?;
+    let force = file.hitting(seen, wanted).filter(|_| !guessed && records_are.is_none());
+    let (values, found) = file.search(seen, force, wanted)?;
     let record = source.name();
     let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
     let why = match (found.decays.first(), found.reason()) {
-        (Some(_), _) if guessed && found.random => {
-            return other(Goal::Thermal, format!("{record}: rises and falls of a random vibration, no free decays"));
-        }
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
             let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
@@ -206,18 +302,30 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())
         }
         (None, Some(reason)) if guessed && !found.steady.is_empty() && is_tone(&values[0]) => {
-            return other(Goal::Steady, format!("{record}: {reason}"));
+            let said = found.steady.first().map_or(reason, |steady| steady.statement());
+            return other(Goal::Steady, format!("{record}: {said}"));
         }
-        (None, Some(_)) if guessed && shows_resonance(&values[0], segment_samples(values[0].len())) => {
-            return other(Goal::Thermal, format!("{record}: noise with a resonance in it"));
+        // what drives in steps and rings no longer than they last
+        (None, Some(_)) if guessed && steps::named(file, &channels).is_some() => {
+            let driver = steps::named(file, &channels).into_iter().map(|driver| driver.location.clone());
+            let (inputs, channels) = (driver.collect::<Vec<String>>(), vec![channels[0].location.clone()]);
+            return input_output(file, &Wanted { inputs: &inputs, channels: &channels, ..*wanted }, None);
+        }
+        (None, Some(reason)) if guessed && (found.random || resonates(&values)) => {
+            if channels.len() > 1 {
+                return Err(several_in_noise(source, &channels));
+            }
+            let reason = if found.random { reason } else { "noise with a resonance in it".to_owned() };
+            return other(Goal::Thermal, format!("{record}: {reason}"));
         }
         (None, Some(reason)) if guessed => {
+            let none = format!("{reason}; no steady oscillation and no resonance in noise either");
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
             let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
-            return Err((format!("{}: no free decay, {reason}", source.file.display()), Some(help)));
+            return Err((format!("{}: no free decay, {none}", source.file.display()), Some(help)));
         }
         (None, reason) => format!("--goal decay; in {record}: {}", reason.unwrap_or_default()),
     };
     let hammer = file.hammer().filter(|_| guessed).map(|hammer| format!("; {hammer}")).unwrap_or_default();
-    Ok(Choice { records_are, notes, ..Choice::of(Goal::Decay, channels, why + &hammer) })
+    Ok(Choice { records_are, force, notes, ..Choice::of(Goal::Decay, channels, why + &hammer) })
 }

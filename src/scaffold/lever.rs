@@ -86,7 +86,7 @@ fn rupture(files: &InputFiles, path: &Path, location: &str) -> Option<usize> {
 
 /// Whether a channel rings down from about the level that it rings round: nothing was let go.
 fn rings_without_a_step(file: &FirstFile<'_>, channel: &Channel, wanted: &Wanted<'_>) -> bool {
-    let Ok((values, found)) = file.search(&[channel], wanted) else { return false };
+    let Ok((values, found)) = file.search(&[channel], None, wanted) else { return false };
     let level = |decay: &FreeDecay| {
         let tail = &values[0][decay.range.start + decay.range.len() / 2..decay.range.end];
         tail.iter().sum::<f64>() / tail.len().max(1) as f64

@@ -129,10 +129,15 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                     // which the choice has refused
                     Some(RecordsAre::Points) => "auto",
                 };
-                text.push_str(&format!("params = {{ as = \"{records_are}\" }}\n"));
+                let trigger = if choice.force.is_some() { ", trigger = { force = {} }" } else { "" };
+                text.push_str(&format!("params = {{ as = \"{records_are}\"{trigger} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.measured_frf\"" => {
-                let blocks = if choice.struck { "hits" } else { "segments" };
+                let blocks = match (choice.struck, choice.period_samples) {
+                    (true, _) => "hits",
+                    (false, Some(_)) => "periods",
+                    (false, None) => "segments",
+                };
                 let quantity = quantity(wanted.unit.unwrap_or(&choice.channels[0].unit));
                 let quantity = quantity.map(|quantity| format!(", quantity = \"{quantity}\"")).unwrap_or_default();
                 let before = if takes && choice.struck { points::fewer_before(source, choice)? } else { None };
@@ -165,6 +170,9 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     let mut params = Table::new();
     params.insert("files".to_owned(), Value::Array(files.collect()));
     params.insert("channel".to_owned(), text(&channel.location));
+    if let Some(force) = choice.force {
+        params.insert("force_channel".to_owned(), text(&force.location));
+    }
     if choice.channels.len() > 1 {
         let all = choice.channels.iter().map(|channel| text(&channel.location)).collect();
         params.insert("channels".to_owned(), Value::Array(all));

@@ -17,18 +17,25 @@ const FOLLOWS: f64 = 0.1;
 /// That a channel of few levels may drive those that are taken, and the command that takes it for the input. None where
 /// there is no such channel.
 pub fn hint(file: &FirstFile<'_>, taken: &[&Channel], wanted: &Wanted<'_>) -> Option<String> {
-    let first = *taken.first()?;
-    let values = file.samples(first).ok()?;
-    let others = file.source.channels.iter().filter(|one| taken.iter().all(|own| own.location != one.location));
-    let mut steps = others.filter(|channel| has_steps(channel, first));
-    let driver = steps.find(|channel| {
-        let follows = || file.samples(channel).is_ok_and(|levels| share_between(&levels, &values) > FOLLOWS);
-        is_input(&channel.location, &channel.unit) || follows()
-    })?;
+    let values = file.samples(taken.first()?).ok()?;
+    let follows =
+        |channel: &&Channel| file.samples(channel).is_ok_and(|levels| share_between(&levels, &values) > FOLLOWS);
+    let driver = named(file, taken).or_else(|| beside(file, taken).find(follows))?;
     let levels = driver.values.as_ref().map_or(0, |values| values.codes);
     let name = &driver.location;
     let command = command(file.source, name, wanted);
     Some(format!("{name} has {levels} levels: --input {name} if it drives the others ({command})"))
+}
+
+/// The channel of few levels that is named as an input, beside those that are taken.
+pub fn named<'a>(file: &FirstFile<'a>, taken: &[&Channel]) -> Option<&'a Channel> {
+    beside(file, taken).find(|channel| is_input(&channel.location, &channel.unit))
+}
+
+/// Channels of few levels beside those that are taken.
+fn beside<'a>(file: &FirstFile<'a>, taken: &[&Channel]) -> impl Iterator<Item = &'a Channel> {
+    let others = file.source.channels.iter().filter(|one| taken.iter().all(|own| own.location != one.location));
+    others.filter(|channel| taken.first().is_some_and(|first| has_steps(channel, first)))
 }
 
 fn has_steps(channel: &Channel, signal: &Channel) -> bool {

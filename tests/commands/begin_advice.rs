@@ -65,7 +65,7 @@ fn a_deflection_is_a_snap_off_s_only_where_a_contact_ruptures_or_the_distance_is
     table(here, "distance.csv", "Time (s),Deflection (V),Z Piezo (um)", even, &[thermal, ramp]);
     for (name, goal, words) in [
         ("decay", "decay", "free decay"),
-        ("thermal", "thermal", "noise with a resonance"),
+        ("thermal", "thermal", "stationary noise"),
         ("curve", "modes", "snap-offs: a rupture at 1"),
         ("distance", "modes", "snap-offs: distance.csv has the distance Z Piezo"),
     ] {
@@ -241,4 +241,122 @@ fn a_unit_over_that_of_a_force_is_a_frequency_response_s() {
     common::command(here, &timed).output().expect("afmid starts");
     let text = std::fs::read_to_string(here.join("t.toml")).unwrap_or_default();
     assert!(!text.contains("io.frf"), "{text}");
+}
+
+/// Motion of an oscillator that white noise drives, of variance 1: `turn` rad a sample.
+fn driven_by_noise(turn: f64, quality: f64, force: &[f64]) -> Vec<f64> {
+    let fall = (-0.5 * turn / quality).exp();
+    let [mut last, mut before] = [0.0; 2];
+    let next = |force: &f64| {
+        let next = 2.0 * fall * turn.cos() * last - fall * fall * before + force;
+        (before, last) = (last, next);
+        next
+    };
+    let moved: Vec<f64> = force.iter().map(next).collect();
+    let rms = (moved.iter().map(|y| y * y).sum::<f64>() / moved.len() as f64).sqrt();
+    moved.iter().map(|y| y / rms).collect()
+}
+
+#[test]
+fn what_is_stationary_is_no_decay_and_its_kind_is_said() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let samples = 40_000;
+    let sum = |parts: [(f64, &[f64]); 3]| -> Vec<f64> {
+        (0..samples).map(|k| parts.iter().map(|(weight, part)| weight * part[k]).sum()).collect()
+    };
+    for (seed, turn, quality) in [(11, 0.88, 60.0), (12, 0.3, 150.0), (13, 1.4, 600.0)] {
+        let own = scratch.path().join(format!("seed {seed}"));
+        std::fs::create_dir(&own).expect("a folder");
+        let here = own.as_path();
+        let [force, other, e] = [0, 1, 2].map(|part| noise(100 * seed + part, samples));
+        let (one, two) = (driven_by_noise(turn, quality, &force), driven_by_noise(0.55 * turn, 80.0, &other));
+        let tone: Vec<f64> = (0..samples).map(|k| (turn * k as f64).sin() + 0.1 * e[k]).collect();
+        let mut place = 0.0;
+        let walk = |e: &f64| {
+            place += e;
+            place
+        };
+        let walk: Vec<f64> = e.iter().map(walk).collect();
+        table(here, "thermal.csv", "Time (s),x (V)", even, &[sum([(1.0, &one), (0.0, &two), (0.2, &e)])]);
+        table(here, "tone.csv", "Time (s),x (V)", even, &[tone]);
+        table(here, "walk.csv", "Time (s),x (V)", even, &[walk]);
+        let sensors = [(1.0, 0.5), (0.7, -0.6), (0.3, 0.9)].map(|(a, b)| sum([(a, &one), (b, &two), (0.1, &e)]));
+        table(here, "ambient.csv", "Time (s),acc1 (m/s^2),acc2 (m/s^2),acc3 (m/s^2)", even, &sensors);
+        for (name, goal) in [("thermal", "thermal"), ("tone", "steady")] {
+            let file = format!("{name}.csv");
+            let [stdout, _] = said(here, &["new", "pipeline", &file, "-o", &format!("{name}.toml"), "--json"]);
+            assert!(stdout.contains(&format!("\"goal\": \"{goal}\"")), "{name}, Q {quality}: {stdout}");
+        }
+        let stderr = refused(here, &["new", "pipeline", "walk.csv", "-o", "walk.toml"]);
+        assert!(stderr.contains("random walk"), "{stderr}");
+        let stderr = refused(here, &["new", "pipeline", "ambient.csv", "-o", "ambient.toml"]);
+        assert!(stderr.contains("3 sensors of a stationary random vibration"), "Q {quality}: {stderr}");
+        // who says decay hears what it is
+        said(here, &["new", "pipeline", "thermal.csv", "--goal", "decay", "-o", "decay.toml"]);
+        let stderr = refused(here, &["run", "decay.toml", "-o", "decay.h5", "--cache", "cache"]);
+        assert!(stderr.contains("no free decay"), "Q {quality}: {stderr}");
+        // where something rose and fell
+        assert!(!stderr.contains("stationary noise") || stderr.contains("--goal thermal"), "Q {quality}: {stderr}");
+    }
+}
+
+#[test]
+fn what_rings_into_the_next_hit_has_all_its_modes_by_the_default_path() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    // rate, hits, modes with frequency and damping ratio: of the slowest the decay time is longer than hits are apart
+    type Case<'a> = (&'a str, f64, &'a [f64], [[f64; 2]; 2]);
+    let cases: [Case<'_>; 4] = [
+        ("quick", 2000.0, &[0.15, 1.1, 2.3, 3.2], [[96.2, 4e-4], [231.0, 9e-4]]),
+        ("slow", 1000.0, &[0.3, 5.1, 9.6], [[40.7, 8e-4], [111.3, 1e-3]]),
+        ("one", 4000.0, &[0.1], [[210.0, 5e-4], [644.0, 6e-4]]),
+        ("weaker", 1600.0, &[0.2, 1.7, 3.0, 4.4, 5.6], [[61.0, 7e-4], [188.0, 8e-4]]),
+    ];
+    for (case, (name, rate, hits, modes)) in cases.into_iter().enumerate() {
+        let samples = ((hits[hits.len() - 1] + if hits.len() > 1 { 1.4 } else { 1.2 }) * rate) as usize;
+        let mut force = noise(600 + case as u64, samples).iter().map(|e| 0.02 * e).collect::<Vec<f64>>();
+        let mut sensors =
+            [0, 1].map(|c| noise(700 + 10 * case as u64 + c, samples).iter().map(|e| 1e-3 * e).collect::<Vec<f64>>());
+        for (number, at) in hits.iter().enumerate() {
+            let size = if name == "weaker" { 1.0 - 0.15 * number as f64 } else { 1.0 };
+            for (k, f) in [30.0, 90.0, 70.0, 10.0].into_iter().enumerate() {
+                let hit = (at * rate) as usize + k;
+                force[hit] += size * f;
+                let answer = |mode: usize, t: f64| {
+                    let ([frequency, damping], tau) = (modes[mode], std::f64::consts::TAU);
+                    let turn = tau * frequency * (1.0 - damping * damping).sqrt();
+                    0.01 * size * f * (-damping * tau * frequency * t).exp() * (turn * t).sin()
+                };
+                for (sensor, shape) in sensors.iter_mut().zip([[1.0, 0.5], [-0.6, 0.9]]) {
+                    for (since, y) in sensor[hit..].iter_mut().enumerate() {
+                        let t = since as f64 / rate;
+                        *y += shape[0] * answer(0, t) + shape[1] * answer(1, t);
+                    }
+                }
+            }
+        }
+        let [one, two] = sensors;
+        let time = move |k: usize| k as f64 / rate;
+        let file = format!("{name}.csv");
+        table(here, &file, "Time (s),Force (N),Acc1 (m/s^2),Acc2 (m/s^2)", time, &[force, one, two]);
+        for (ending, goal) in [("", &[][..]), ("-decay", &["--goal", "decay"])] {
+            let (config, result) = (format!("{name}{ending}.toml"), format!("{name}{ending}.h5"));
+            said(here, &[&["new", "pipeline", &file, "-o", &config], goal].concat());
+            let text = std::fs::read_to_string(here.join(&config)).expect("a config");
+            assert!(text.contains("model.decay") && text.contains("force_channel = \"Force\""), "{name}: {text}");
+            said(here, &["run", &config, "-o", &result, "--cache", "cache"]);
+            let events = &common::shown(here, &result, "events")["events"];
+            assert_eq!(events["found"], hits.len(), "{name}: {events}");
+            let found = common::shown(here, &result, "modes");
+            let found = found["modes"].as_array().expect("modes");
+            assert_eq!(found.len(), 2, "{name}: {found:?}");
+            for (mode, [frequency, damping]) in found.iter().zip(modes) {
+                let number = |key: &str| mode[key].as_f64().expect("a number");
+                // five standard errors: sixteen numbers, one of them beyond once in a hundred thousand times
+                let [df, dz] = [number("frequency_hz") - frequency, number("damping_ratio") - damping];
+                assert!(df.abs() < 5.0 * number("frequency_std_hz"), "{name}: {mode}, wanted {frequency}");
+                assert!(dz.abs() < 5.0 * number("damping_ratio_std"), "{name}: {mode}, wanted {damping}");
+            }
+        }
+    }
 }

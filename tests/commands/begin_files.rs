@@ -353,7 +353,9 @@ fn a_force_is_the_input_by_its_name_or_unit_and_one_set_of_like_sensors_the_outp
     let binary: Vec<f64> = noise(4).iter().cycle().take(6000).map(|e| if *e > 0.0 { 1.0 } else { -1.0 }).collect();
     table(here, "binary.csv", 1e-3, "Time (s),u,y", &[binary.clone(), moved(&binary, 0.4, 5)]);
     let [stdout, _] = said(here, &["new", "pipeline", "binary.csv", "-o", "b.toml"]);
-    assert!(stdout.contains("measured input u and output y"), "{stdout}");
+    assert!(stdout.contains("input u, which repeats itself every 2000 samples, and output y"), "{stdout}");
+    let text = std::fs::read_to_string(here.join("b.toml")).expect("a config");
+    assert!(text.contains("model.pem"), "{text}");
     // a step or two leave what follows to ring freely
     let once = decay(1.0, 8);
     let step: Vec<f64> = (0..2 * once.len()).map(|k| if k < once.len() { 0.0 } else { 1.0 }).collect();

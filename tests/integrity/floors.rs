@@ -88,7 +88,7 @@ const CRATES: [Crate; 5] = [
         name: "afmid",
         src: "src",
         floors: &[
-            &["address_space", "printable", "relative", "export"],
+            &["address_space", "determined", "printable", "relative", "export"],
             &["failure", "diagnostic"],
             &["output"],
             &["interrupt", "show"],

@@ -8,6 +8,8 @@ pub(crate) const DEFLECTION: &str = "deflection";
 pub(crate) const SENSOR: &str = "sensor";
 /// Role of the piezo's position.
 pub(crate) const PIEZO: &str = "piezo";
+/// The measured force of hits.
+pub(crate) const FORCE: &str = "force";
 
 /// The deflection. Errors: the record has none.
 pub(crate) fn deflection(record: &Record) -> Result<&Channel, StageError> {

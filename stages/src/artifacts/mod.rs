@@ -33,7 +33,7 @@ mod shapes;
 mod transfer;
 
 pub(crate) use average::{Average, AveragedSet, empty_average};
-pub(crate) use channels::{DEFLECTION, PIEZO, SENSOR, deflection, piezo};
+pub(crate) use channels::{DEFLECTION, FORCE, PIEZO, SENSOR, deflection, piezo};
 pub use data_set::DataSet;
 pub use decays::Sensor;
 pub(crate) use decays::{Decays, decay_array};

@@ -10,11 +10,11 @@ use afmid_pipeline::{
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 
-use crate::artifacts::{PIEZO, Sensor, decay_array, with_rate_std};
+use super::decay_rows::{Row, all_noise, nothing_found, summary, table};
+use crate::artifacts::{FORCE, PIEZO, Sensor, decay_array, with_rate_std};
 use crate::io::{CopyOf, warn_of_copies};
-use afmid_kernels::events::decay::{DecayEnd, DecaySearch, DecaySearchOptions, DismissedReason, FreeDecay};
+use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, DecayTrigger, DismissedReason, FreeDecay};
 use afmid_kernels::harmonics::find_decays_beside_lines;
 
 /// Finds free decays in records: after a hit, a release, a pulse, or the end of a drive.
@@ -33,7 +33,9 @@ use afmid_kernels::harmonics::find_decays_beside_lines;
 /// Units: the channels' own; Hz; s.
 /// Accuracy: in all but one of a hundred decays the first free sample is no more than a sixteenth of a period early and
 /// half a period late, and the end within three quarters of the decay time (docs/results/decay.md).
-/// Errors: no free decay in any record; records of different rates or numbers of channels; samples that are missing.
+/// A decay is larger than the excursions that stationary noise of its band has in one record of a thousand.
+/// Errors: no free decay in any record; stationary noise; records of different rates or numbers of channels; samples that
+/// are missing.
 /// Source: R. V. Allen, Bull. Seismol. Soc. Am. 68 (1978) 1521; G. R. B. de Prony, J. Ec. Polytech. 1 (1795) 24.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -76,7 +78,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 8,
+        version: 9,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -105,7 +107,11 @@ impl Stage for Decay {
         let hits: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::hits).collect();
         let rows: Vec<Row> = searched.iter().zip(&groups).flat_map(|(searched, group)| searched.rows(group)).collect();
         if hits.is_empty() {
-            return Err(nothing_found(&rows, &groups));
+            let noise: Option<Vec<String>> = searched.iter().map(|one| one.found.noise()).collect();
+            return Err(match (noise, groups.first()) {
+                (Some(noise), Some(first)) => all_noise(&noise, &first.records[0].name, first.channels.len()),
+                _ => nothing_found(&rows, groups.len()),
+            });
         }
         // beside a decay a steady stretch is a fact, which the table and the summary state
         let decays: HashSet<&str> =
@@ -142,9 +148,13 @@ struct Searched {
 
 impl Decay {
     fn groups<'a>(&self, records: &'a [Record]) -> Result<Vec<Group<'a>>, StageError> {
-        let all = |record: &'a Record| {
-            record.channels.iter().filter(|channel| channel.role != PIEZO).map(move |channel| (record, channel))
+        let by_force = matches!(self.search.trigger, DecayTrigger::Force { .. });
+        let searched = move |channel: &&Channel| match channel.role.as_str() {
+            PIEZO => false,
+            FORCE => by_force,
+            _ => true,
         };
+        let all = |record: &'a Record| record.channels.iter().filter(searched).map(move |channel| (record, channel));
         let group = |pairs: Vec<(&'a Record, &'a Channel)>| {
             let (records, channels) = pairs.into_iter().unzip();
             Group { records, channels }
@@ -152,7 +162,15 @@ impl Decay {
         Ok(match self.records_are {
             RecordsAre::Auto => records.iter().map(|record| group(all(record).collect())).collect(),
             RecordsAre::Hits => records.iter().flat_map(all).map(|pair| group(vec![pair])).collect(),
-            RecordsAre::Sensors => vec![group(records.iter().flat_map(all).collect())],
+            RecordsAre::Sensors => {
+                // a file each may have recorded the force of the same hits
+                let mut forces = 0;
+                let first_force = |(_, channel): &(&Record, &Channel)| {
+                    forces += usize::from(channel.role == FORCE);
+                    channel.role != FORCE || forces == 1
+                };
+                vec![group(records.iter().flat_map(all).filter(first_force).collect())]
+            }
         })
     }
 }
@@ -270,7 +288,13 @@ impl Group<'_> {
             values.push(read);
         }
         let slices: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
-        let found = find_decays_beside_lines(&slices, rate, options).map_err(StageError::from_error)?;
+        let mut options = options.clone();
+        // the channel that the record says is the force, if it does
+        let force = self.channels.iter().position(|channel| channel.role == FORCE);
+        if let (DecayTrigger::Force { channel }, Some(force)) = (&mut options.trigger, force) {
+            *channel = force;
+        }
+        let found = find_decays_beside_lines(&slices, rate, &options).map_err(StageError::from_error)?;
         Ok(Searched { values, found })
     }
 }
@@ -326,116 +350,21 @@ impl Searched {
         }));
         rows.extend(self.found.dismissed.iter().map(|dismissed| {
             let reason = match dismissed.reason {
-                DismissedReason::TooShort => "less than two periods above the noise",
-                DismissedReason::NoRinging => "nothing rings above the noise",
+                DismissedReason::TooShort => "less than two periods above the noise".to_owned(),
+                DismissedReason::NoRinging => "nothing rings above the noise".to_owned(),
+                DismissedReason::Excursion { ratio, limit } => format!(
+                    "no larger than stationary noise becomes: {ratio:.1} times the mean energy of its band, of {limit:.0}"
+                ),
+                DismissedReason::Walk => "part of a random walk".to_owned(),
+                DismissedReason::Random => "one of many rises and falls of a random vibration".to_owned(),
             };
-            Row::refused(record, dismissed.onset, reason.to_owned())
+            Row::refused(record, dismissed.onset, reason)
         }));
         rows.sort_by_key(|row| row.onset);
         if rows.is_empty() {
             rows.push(Row::refused(record, 0, self.found.reason().unwrap_or_default()));
         }
         rows
-    }
-}
-
-/// A decay, or what is none.
-#[derive(Debug, Clone)]
-struct Row {
-    record: String,
-    onset: usize,
-    first: usize,
-    end: usize,
-    ends_at: &'static str,
-    frequency_hz: f64,
-    /// Decay rate and its standard error.
-    rate_per_s: (f64, f64),
-    peak: f64,
-    clipped: usize,
-    steady: bool,
-    /// Why it is none; empty for a decay.
-    rejected: String,
-}
-
-impl Row {
-    fn of_decay(record: &str, decay: &FreeDecay) -> Self {
-        Self {
-            record: record.to_owned(),
-            onset: decay.onset,
-            first: decay.range.start,
-            end: decay.range.end,
-            ends_at: match decay.end {
-                DecayEnd::Noise => "noise",
-                DecayEnd::NextEvent => "next event",
-                DecayEnd::RecordEnd => "end of the record",
-            },
-            frequency_hz: decay.frequency_hz,
-            rate_per_s: (decay.decline.rate_per_s, decay.decline.std_per_s),
-            peak: decay.channels.first().map_or(f64::NAN, |channel| channel.peak),
-            clipped: decay.channels.iter().flat_map(|channel| &channel.clipped).map(ExactSizeIterator::len).sum(),
-            steady: false,
-            rejected: String::new(),
-        }
-    }
-
-    fn refused(record: &str, onset: usize, rejected: String) -> Self {
-        Self {
-            record: record.to_owned(),
-            onset,
-            first: onset,
-            end: onset,
-            ends_at: "",
-            frequency_hz: f64::NAN,
-            rate_per_s: (f64::NAN, f64::NAN),
-            peak: f64::NAN,
-            clipped: 0,
-            steady: false,
-            rejected,
-        }
-    }
-}
-
-fn table(rows: &[Row], rate: f64) -> Table {
-    Table::of(rows)
-        .with("record", "", "file name of the record", |row| row.record.clone())
-        .with("onset_s", "s", "time of the hit in the record", |row| row.onset as f64 / rate)
-        .with("first", "1", "first free sample", |row| row.first)
-        .with("end", "1", "one past the last sample above the noise", |row| row.end)
-        .with("ends_at", "", "what ends it", |row| row.ends_at)
-        .with("frequency_hz", "Hz", "strongest frequency, to the width of a line", |row| row.frequency_hz)
-        .with_std(["decay_rate", "decay_rate_std"], "1/s", "decay rate of its amplitude", |row| row.rate_per_s)
-        .with("peak", "", "largest departure of the first channel, or a steady amplitude", |row| row.peak)
-        .with("clipped", "1", "clipped samples, left out", |row| row.clipped)
-        .with("rejected", "", "why it is no decay; empty if it is one", |row| row.rejected.clone())
-        .table()
-}
-
-fn summary(rows: &[Row], hits: usize, sensors: &[Sensor], rate: f64) -> Result<Document, StageError> {
-    let rejected = rows.iter().filter(|row| !row.rejected.is_empty());
-    let rejected = rejected.map(|row| json!({ "record": row.record, "reason": row.rejected }));
-    Document::new(&json!({
-        "events": { "found": hits, "kind": "decay", "rejected": rejected.collect::<Vec<Value>>() },
-        "channels": sensors,
-        "sample_rate_hz": rate,
-        "steady": rows.iter().filter(|row| row.steady).count(),
-    }))
-}
-
-/// Reasons that are named in an error.
-const MOST_REASONS: usize = 5;
-
-fn nothing_found(rows: &[Row], groups: &[Group]) -> StageError {
-    let reasons: Vec<String> =
-        rows.iter().take(MOST_REASONS).map(|row| format!("{}: {}", row.record, row.rejected)).collect();
-    let more = rows.len().saturating_sub(MOST_REASONS);
-    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-    let error = StageError::new(format!("no free decay in {} records: {}{more}", groups.len(), reasons.join("; ")));
-    match rows.iter().any(|row| row.steady) {
-        true => error.help(
-            "no decay is seen beside the steady line either: record the ringing after the drive has ended or without the \
-             hum, or say where decays begin: trigger = { given = { times_s = [...] } }",
-        ),
-        false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
     }
 }
 

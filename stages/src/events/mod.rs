@@ -3,6 +3,7 @@
 mod correlation;
 mod decay;
 pub(crate) mod decay_example;
+mod decay_rows;
 mod example;
 mod extraction;
 mod listing;

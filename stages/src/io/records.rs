@@ -15,7 +15,7 @@ use super::consistency::{Consistency, check_consistency};
 use super::file_patterns::{Match, matching_files};
 use super::repeats::{Printed, each_once};
 use super::shared_data::moved;
-use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
+use crate::artifacts::{DEFLECTION, FORCE, PIEZO, SENSOR};
 
 /// Opens records of any format by pattern.
 ///
@@ -32,7 +32,7 @@ use crate::artifacts::{DEFLECTION, PIEZO, SENSOR};
 /// piezo's have equal samples (more than 100, not all of one value; as stored or in their units, whatever format and
 /// attributes), the first stays, and a warning names the others. Records that differ cost a thousand samples each.
 /// # Shapes
-/// One record per file, with the roles `deflection` and, where the file has it, `piezo`; where a recording was
+/// One record per file, with the roles `deflection` and, where they are named and there, `force` and `piezo`; where a recording was
 /// interrupted (restarts, lost buffers), one per uninterrupted stretch, `file.tdms[1]`, `file.tdms[2]`.
 /// # Units
 /// The channels' own.
@@ -58,6 +58,9 @@ pub struct Records {
     pub channels: Vec<String>,
     /// The piezo monitor, used where a file has it; empty: not looked for.
     pub piezo_channel: String,
+    /// The measured force of hits, in a unit of its own: where free decays begin (`trigger = { force = {} }` of
+    /// `events.decay`); empty: not looked for.
+    pub force_channel: String,
     /// Least sample rate, in Hz, of an archive that is known to be faster: twenty samples in a period of a 10 kHz lever
     /// are 200,000.
     #[schemars(range(min = 0.0))]
@@ -87,6 +90,7 @@ impl Default for Records {
             channel: "/deflection".to_owned(),
             channels: Vec::new(),
             piezo_channel: "/piezo".to_owned(),
+            force_channel: String::new(),
             min_sample_rate_hz: 0.0,
             skip_unreadable: false,
             format: "auto".to_owned(),
@@ -213,6 +217,9 @@ impl Records {
         };
         let named = if self.channels.is_empty() { std::slice::from_ref(&self.channel) } else { &self.channels[..] };
         let mut wanted: Vec<Wanted> = named.iter().map(String::as_str).enumerate().map(sensor).collect();
+        if !self.force_channel.is_empty() {
+            wanted.push(Wanted { role: FORCE, location: &self.force_channel, required: true });
+        }
         if !self.piezo_channel.is_empty() {
             wanted.push(Wanted { role: PIEZO, location: &self.piezo_channel, required: false });
         }

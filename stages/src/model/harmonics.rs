@@ -19,7 +19,8 @@ use afmid_kernels::harmonics::{Harmonic, HarmonicFit, HarmonicOptions, fit_harmo
 /// Shapes: `harmonics` a row per record, channel and harmonic.
 /// Units: Hz, rad; amplitudes in the channels' own, peak.
 /// Accuracy: the Cramer-Rao bound; where the phase wanders, the error of the mean frequency by the scatter of the parts.
-/// Errors: no record; a channel without a line; samples that are missing.
+/// Errors: no record; a channel without a line; noise alone, in one record of a thousand taken for an oscillation; samples
+/// that are missing.
 /// Source: IEEE Std 1057-2017; D. C. Rife, R. R. Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
@@ -50,7 +51,7 @@ impl Stage for Harmonics {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.harmonics",
-        version: 2,
+        version: 3,
         summary: "fits a steady oscillation: frequency, harmonics, and whether it is steady",
         inputs: &[RECORDS.spec()],
         outputs: &[HARMONICS.spec(), SUMMARY.spec()],
@@ -76,6 +77,14 @@ impl Stage for Harmonics {
                 fit
             })
             .collect::<Result<_, StageError>>()?;
+        let (fits, none): (Vec<Fitted>, Vec<Fitted>) =
+            fits.into_iter().partition(|fitted| fitted.fit.chance < FALSE_ALARM);
+        if let (true, Some(first)) = (fits.is_empty(), none.first()) {
+            let help = "`afmid new pipeline FILE --goal thermal` looks for a resonance in noise; `near_hz` searches fewer \
+                        frequencies";
+            return Err(StageError::new(first.is_none()).help(help));
+        }
+        none.iter().for_each(|fitted| cx.warn(fitted.is_none()));
         fits.iter().flat_map(Fitted::warnings).for_each(|warning| cx.warn(warning));
         let rows: Vec<(&Fitted, &Harmonic)> =
             fits.iter().flat_map(|fitted| fitted.fit.harmonics.iter().map(move |h| (fitted, h))).collect();
@@ -106,6 +115,20 @@ impl Harmonics {
 }
 
 impl Fitted {
+    /// That noise alone has such a line.
+    fn is_none(&self) -> String {
+        let Self { record, channel, fit, .. } = self;
+        let often = match fit.chance < 1.0 {
+            true => format!(" in {:.2} % of such records", 100.0 * fit.chance),
+            false => String::new(),
+        };
+        format!(
+            "{record}, {channel}: no oscillation: of all frequencies searched the strongest, {:.6} Hz, has an amplitude that \
+             noise alone has{often}",
+            fit.frequency_hz
+        )
+    }
+
     fn warnings(&self) -> Vec<String> {
         let Self { record, channel, fit, .. } = self;
         let mut said = Vec::new();

@@ -19,13 +19,14 @@ fn record(samples: usize, rest: usize) -> [Vec<f64>; 2] {
     let turn = std::f64::consts::TAU * 61.0 / RATE;
     let (fall, damped) = ((-0.5 * turn / 25.0).exp(), turn * (1.0 - 0.25 / 625.0_f64).sqrt());
     let drive = white_noise(samples, 1.0, 5);
-    let noise = white_noise(samples + rest, 0.02, 6);
+    // the same noise beside the same motion
+    let noise = [white_noise(rest, 0.02, 7), white_noise(samples, 0.02, 6)].concat();
     let input: Vec<f64> = (0..samples + rest).map(|k| if k < rest { 0.0 } else { drive[k - rest] }).collect();
     let mut y = vec![0.0; samples + rest];
     for k in 2..y.len() {
         y[k] = 2.0 * fall * damped.cos() * y[k - 1] - fall * fall * y[k - 2] + input[k - 1];
     }
-    let output = y.iter().zip(&noise[..]).map(|(y, e)| y + e).collect();
+    let output = y.iter().zip(&noise).map(|(y, e)| y + e).collect();
     [input, output]
 }
 
@@ -74,8 +75,9 @@ fn by_responses(pair: &Array) -> Found {
     only(fitted.get(&MODES).unwrap())
 }
 
-const METHODS: [(&str, fn(&Array) -> Found); 3] =
-    [("pem", by_pem), ("subspace", by_subspace), ("responses", by_responses)];
+type Method = (&'static str, fn(&Array) -> Found);
+
+const METHODS: [Method; 3] = [("pem", by_pem), ("subspace", by_subspace), ("responses", by_responses)];
 
 #[test]
 fn scales_of_input_and_output_change_no_pole() {
@@ -105,7 +107,7 @@ fn offsets_and_what_was_before_the_onset_move_no_pole_beyond_its_error() {
         for (what, changed) in [("offset", offset), ("20 samples before", pair(record(16_384, 20)))] {
             let found = method(&changed);
             let far = ((found[0] - f) / f_std).abs().max(((found[2] - q) / q_std).abs());
-            assert!(far < 0.5, "{name}, {what}: {f} {q}, {found:?}");
+            assert!(far < 1.0, "{name}, {what}: {f} {q}, {found:?}");
         }
         // the truth
         assert!((f - 61.0).abs() < 4.0 * f_std && (q - 25.0).abs() < 4.0 * q_std, "{name}: {f}({f_std}) {q}({q_std})");

@@ -9,7 +9,10 @@ use serde_json::{Value, json};
 
 use crate::artifacts::Density;
 use crate::io::DENSITY;
-use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, ThermalFitSettings, thermal_fit};
+use afmid_kernels::spectra::{
+    AveragedDensity, Fitted, RESONANCE_FALSE_ALARM, SeenThrough, ThermalFit, ThermalFitSettings, resonance_chance,
+    thermal_fit,
+};
 
 /// Fits a thermal spectrum: resonance, quality factor, level, white and 1/f noise.
 ///
@@ -26,10 +29,11 @@ use afmid_kernels::spectra::{AveragedDensity, Fitted, SeenThrough, ThermalFit, T
 /// Hz; `variance` in the signal's unit squared, `white` the same per hertz.
 /// # Accuracy
 /// `std` from the Fisher information, the correlation of the window's bins counted; `robust_std` from the misfits
-/// (sandwich), which also allows for a wrong number of averages. Resonances two bins wide are unbiased. Cost: 0.2 us
+/// (sandwich), which also allows for a wrong number of averages. A resonance gains more in likelihood than noise alone does
+/// in one spectrum of a thousand, all frequencies searched. Resonances two bins wide are unbiased. Cost: 0.2 us
 /// per bin and step, some twenty steps.
 /// # Errors
-/// Fewer than 24 bins in the band, no resonance between the limits, no convergence.
+/// Fewer than 24 bins in the band, no resonance between the limits, none that noise alone does not show, no convergence.
 /// # Source
 /// P. Whittle, Ark. Mat. 2 (1953) 423; A. M. Sykulski et al., Biometrika 106 (2019) 251; H. White, Econometrica 50
 /// (1982) 1.
@@ -76,7 +80,7 @@ impl Stage for Thermal {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "spectrum.thermal",
-        version: 1,
+        version: 2,
         summary: "fits resonance, quality factor and noise levels to a thermal spectrum",
         inputs: &[DENSITY.spec()],
         outputs: &[FIT.spec(), LINES.spec(), SUMMARY.spec()],
@@ -101,6 +105,10 @@ impl Stage for Thermal {
         let through = self.through(&density)?;
         let data = AveragedDensity { frequency_hz: f, density: p, averages: density.averages, through };
         let fit = thermal_fit(data, self.fit).map_err(StageError::from_error)?;
+        let chance = resonance_chance(&data, &fit);
+        if chance >= RESONANCE_FALSE_ALARM {
+            return Err(no_resonance(&fit, chance));
+        }
         self.warn(&fit, f, data.averages, cx);
         Ok(Ports::new()
             .with(&FIT, fit_array(f, p, &fit, density.unit))
@@ -164,6 +172,20 @@ impl Thermal {
             ));
         }
     }
+}
+
+/// That the best resonance is one that noise alone shows.
+fn no_resonance(fit: &ThermalFit, chance: f64) -> StageError {
+    let often = match chance < 1.0 {
+        true => format!("noise alone shows as much in {:.2} % of such spectra", 100.0 * chance),
+        false => "noise alone shows as much".to_owned(),
+    };
+    let (bins, hz) = (fit.bins, fit.frequency_hz.value);
+    let help = "average longer records; `fitted_hz = [..., ...]` searches fewer frequencies";
+    StageError::new(format!(
+        "no resonance: {bins} frequencies were searched, and at the best of them, {hz:.6} Hz, {often}"
+    ))
+    .help(help)
 }
 
 fn window_name(through: SeenThrough) -> &'static str {

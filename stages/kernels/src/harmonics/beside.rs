@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use super::{HarmonicFit, HarmonicOptions, fit_harmonics};
-use crate::events::decay::{DecaySearch, DecaySearchError, DecaySearchOptions, DecayTrigger, FreeDecay, find_decays};
+use crate::events::decay::{DecaySearch, DecaySearchError, DecaySearchOptions, FreeDecay, find_decays};
 
 /// Least peak of a decay, in amplitudes of the line: of a drive that is steady to less what is left is none.
 const LEAST_PEAK: f64 = 0.2;
@@ -29,7 +29,7 @@ pub fn find_decays_beside_lines(
     options: &DecaySearchOptions,
 ) -> Result<DecaySearch, DecaySearchError> {
     let found = find_decays(channels, sample_rate_hz, options)?;
-    let driven = matches!(options.trigger, DecayTrigger::DriveEnd { .. });
+    let driven = options.trigger.left_out().is_some();
     let Some(steady) = found.steady.first().filter(|_| found.decays.is_empty() && !driven) else { return Ok(found) };
     let line_hz = steady.frequency_hz;
     let near = HarmonicOptions { near_hz: Some(line_hz), ..HarmonicOptions::default() };
@@ -51,8 +51,7 @@ pub fn find_decays_beside_lines(
         multiple.round() >= 1.0 && (multiple - multiple.round()).abs() < OWN * multiple
     };
     let large = |peak: f64| peak.abs() >= LEAST_PEAK * largest;
-    let beside = !second.random
-        && !second.decays.is_empty()
+    let beside = !second.decays.is_empty()
         && second
             .decays
             .iter()

@@ -11,6 +11,10 @@ use super::{Harmonic, HarmonicError, HarmonicFit, HarmonicOptions};
 
 /// Samples at least: a period has three, and three periods are needed.
 const LEAST_SAMPLES: usize = 32;
+/// Bins of the residual whose mean is the noise at a harmonic.
+const NOISE_BINS: f64 = 36.0;
+/// Share of a given frequency within which the fundamental is sought.
+const NEAR: f64 = 0.1;
 /// Gauss-Newton steps at most: it converges quadratically from a tenth of a bin.
 const STEPS: usize = 20;
 
@@ -103,10 +107,15 @@ fn result(y: &[f64], omega: f64, fit: &LinearFit, noise: &[f64], rate: f64, opti
         .map(|(index, (c, s))| harmonic(index + 1, *c, 2.0 * s / samples, omega, omega_std, centre))
         .collect();
     let power = |h: &Harmonic| (h.amplitude.powi(2) - 2.0 * h.amplitude_std.powi(2)).max(0.0);
+    // two independent values a bin; the noise's density is that of some bins, so that the ratio is no exponential variable
+    let searched = samples * options.near_hz.map_or(1.0, |near| 2.0 * NEAR * near / rate);
+    let ratio = -harmonics[0].p_value.max(f64::MIN_POSITIVE).ln();
+    let chance = (searched * (1.0 + ratio / NOISE_BINS).powf(-NOISE_BINS)).min(1.0);
     let further: f64 = harmonics.iter().skip(1).map(power).sum();
     HarmonicFit {
         frequency_hz: omega / TAU * rate,
         frequency_std_hz: omega_std / TAU * rate,
+        chance,
         offset: fit.offset,
         distortion: (further / harmonics[0].amplitude.powi(2).max(f64::MIN_POSITIVE)).sqrt(),
         harmonics,

@@ -101,6 +101,8 @@ pub struct HarmonicFit {
     pub frequency_hz: f64,
     /// Standard error by the noise at the harmonics, or by the scatter of the parts' phases, whichever is larger.
     pub frequency_std_hz: f64,
+    /// Chance that noise alone has such a fundamental at any of the frequencies searched, at most 1.
+    pub chance: f64,
     /// Level that it oscillates about.
     pub offset: f64,
     /// The fundamental first.

@@ -12,21 +12,25 @@ const LEAST_PERIODS: usize = 8;
 /// Share of the plateau's energy down to which its last samples still belong to it.
 const PLATEAU: f64 = 0.8;
 
-/// The sample after each stretch of a drive: the last one beyond a tenth of its largest swing before it rests for two
-/// periods.
-pub(super) fn ends_of_drive(drive: &[f64], period: usize) -> Vec<usize> {
+/// Stretches of a drive or of a force: from the first to the last sample beyond a tenth of its largest swing before it rests
+/// for two periods.
+pub(super) fn driven_stretches(drive: &[f64], period: usize) -> Vec<Range<usize>> {
     let rest = median(&mut drive[drive.len() - drive.len() / 16 - 1..].to_vec());
     let largest = drive.iter().fold(0.0_f64, |m, y| m.max((y - rest).abs()));
-    let mut ends = Vec::new();
-    let mut last = None;
+    let mut stretches: Vec<Range<usize>> = Vec::new();
     for k in (0..drive.len()).filter(|&k| (drive[k] - rest).abs() > 0.1 * largest) {
-        if let Some(before) = last.filter(|before| k - before > 2 * period) {
-            ends.push(before + 1);
+        match stretches.last_mut() {
+            Some(last) if k < last.end + 2 * period => last.end = k + 1,
+            _ => stretches.push(k..k + 1),
         }
-        last = Some(k);
     }
-    ends.extend(last.map(|k| k + 1).filter(|end| end + 2 * period < drive.len()));
-    ends
+    stretches
+}
+
+/// The sample after each stretch of a drive that is followed by two periods of rest.
+pub(super) fn ends_of_drive(drive: &[f64], period: usize) -> Vec<usize> {
+    let rests = |end: &usize| end + 2 * period < drive.len();
+    driven_stretches(drive, period).into_iter().map(|stretch| stretch.end).filter(rests).collect()
 }
 
 /// Samples where a steady response begins to die.

@@ -109,16 +109,27 @@ impl Steady {
 }
 
 /// Why a start was not taken for a decay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DismissedReason {
     /// Too few samples before it drowns or the next event begins: less than two periods.
     TooShort,
     /// Nothing there exceeds the noise.
     NoRinging,
+    /// No larger than stationary noise of its band becomes by itself.
+    Excursion {
+        /// Its largest energy over the mean one there.
+        ratio: f64,
+        /// The ratio that noise exceeds in one record of a thousand.
+        limit: f64,
+    },
+    /// One of many rises and falls of a random vibration.
+    Random,
+    /// Part of a random walk.
+    Walk,
 }
 
 /// A start that was not taken for a decay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DismissedDecay {
     /// Where.
     pub onset: usize,
@@ -141,16 +152,54 @@ pub struct DecaySearch {
     pub largest_energy: f64,
     /// Numbers of the channels that are searched: all but the drive's.
     pub channels: Vec<usize>,
-    /// Whether the decays look like the rises and falls of a random vibration: many, in a signal that is normally
-    /// distributed.
+    /// Whether what rises and falls is a random vibration: no rise is larger than stationary noise has them, or there are
+    /// many in a signal that is normally distributed.
     pub random: bool,
 }
 
 impl DecaySearch {
+    /// That what rises and falls is stationary noise; none where it is not.
+    pub fn noise(&self) -> Option<String> {
+        if !self.random {
+            return None;
+        }
+        let rises = match self.decays_of_noise().count() {
+            0 => "an oscillation that its own fluctuations sustain".to_owned(),
+            1 => "a rise and fall".to_owned(),
+            many => format!("{many} rises and falls"),
+        };
+        let ratio = |dismissed: &DismissedDecay| match dismissed.reason {
+            DismissedReason::Excursion { ratio, limit } => Some((ratio, limit)),
+            _ => None,
+        };
+        let largest = self.dismissed.iter().filter_map(ratio).max_by(|a, b| a.0.total_cmp(&b.0));
+        let size = largest.map(|(ratio, limit)| {
+            format!(
+                ", the largest of {ratio:.1} times the mean energy of its band; stationary noise exceeds {limit:.0} times \
+                 in one record of a thousand"
+            )
+        });
+        Some(format!("stationary noise: {rises}{}", size.unwrap_or_default()))
+    }
+
+    fn decays_of_noise(&self) -> impl Iterator<Item = &DismissedDecay> {
+        self.dismissed
+            .iter()
+            .filter(|dismissed| matches!(dismissed.reason, DismissedReason::Excursion { .. } | DismissedReason::Random))
+    }
+
     /// Why nothing was found, where that is so.
     pub fn reason(&self) -> Option<String> {
         if !self.decays.is_empty() {
             return None;
+        }
+        if let Some(noise) = self.noise() {
+            return Some(noise);
+        }
+        if self.dismissed.iter().any(|dismissed| dismissed.reason == DismissedReason::Walk) {
+            let walk =
+                "a random walk: samples differ by the root of their distance, and no oscillation stands out of it";
+            return Some(walk.to_owned());
         }
         if let Some(steady) = self.steady.first() {
             return Some(steady.statement());
@@ -164,6 +213,9 @@ impl DecaySearch {
                 match first.reason {
                     DismissedReason::TooShort => "is followed by less than two periods above the noise",
                     DismissedReason::NoRinging => "is followed by noise alone",
+                    DismissedReason::Excursion { .. } => "is no larger than stationary noise becomes",
+                    DismissedReason::Random => "is one of a random vibration's",
+                    DismissedReason::Walk => "is part of a random walk",
                 }
             ),
             None => format!("noise alone: no period's rms exceeds {largest:.1} times the noise's"),

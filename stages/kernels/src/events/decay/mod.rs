@@ -36,11 +36,15 @@ mod clipping;
 mod drive;
 mod envelope;
 mod error;
+mod excursion;
 mod extent;
 mod found;
 mod noise_floor;
+#[cfg(test)]
+mod noise_tests;
 mod onsets;
 mod options;
+mod random;
 mod search;
 #[cfg(test)]
 mod search_tests;

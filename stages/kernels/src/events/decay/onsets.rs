@@ -105,6 +105,6 @@ pub(super) fn onsets(
             all.dedup();
             all
         }
-        DecayTrigger::LargestRise | DecayTrigger::DriveEnd { .. } => rises(envelope, options),
+        _ => rises(envelope, options),
     }
 }

@@ -27,11 +27,28 @@ pub enum DecayTrigger {
         #[serde(default)]
         channel: Option<usize>,
     },
+    /// The hits of a measured force, such as a hammer's: decays begin where it has ended.
+    Force {
+        /// Channel with the force, from 0, left out of the decays; of records that name their force it is that one.
+        #[serde(default)]
+        channel: usize,
+    },
     /// Given times.
     Given {
         /// Times of the hits, s from the first sample, ascending.
         times_s: Vec<f64>,
     },
+}
+
+impl DecayTrigger {
+    /// The channel that drives and takes no part in the decays.
+    pub const fn left_out(&self) -> Option<usize> {
+        match self {
+            Self::DriveEnd { channel } => *channel,
+            Self::Force { channel } => Some(*channel),
+            _ => None,
+        }
+    }
 }
 
 /// How decays are searched.
@@ -96,6 +113,7 @@ impl DecaySearchOptions {
                 Some(*channel)
             }
             DecayTrigger::DriveEnd { channel } => *channel,
+            DecayTrigger::Force { channel } => Some(*channel),
             DecayTrigger::Given { times_s } => {
                 if let Some(bad) = times_s.iter().find(|t| !(t.is_finite() && **t >= 0.0)) {
                     let wanted = "times within the record";
@@ -105,7 +123,7 @@ impl DecaySearchOptions {
             }
             DecayTrigger::LargestRise => None,
         };
-        let only = matches!(self.trigger, DecayTrigger::DriveEnd { channel: Some(_) }) && channels < 2;
+        let only = self.trigger.left_out().is_some() && channels < 2;
         match channel {
             Some(found) if found >= channels || only => Err(DecaySearchError::Parameter {
                 name: "channel",

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::clipping::{clipped, touches};
-use super::drive::{bend, ends_of_drive, ends_of_response};
+use super::drive::{bend, driven_stretches, ends_of_drive, ends_of_response};
 use super::envelope::{Envelope, Pitch, without_drift};
 use super::error::DecaySearchError;
 use super::extent::{Begin, begin, beyond, departure, end, quiet_before};
@@ -15,17 +15,15 @@ use super::steadiness::oscillation;
 use crate::events::baseline;
 use crate::signal::code_step;
 
+/// Share of a period before the next hit of a force that is left out. Why: a converter's filter of linear phase answers
+/// some samples before it.
+const BEFORE_HIT: f64 = 0.5;
 /// Least samples of a record.
 const LEAST_SAMPLES: usize = 64;
 /// Periods of a decay at least.
 const LEAST_PERIODS: usize = 2;
 /// Fall of the amplitude, nepers, that is a decay whatever its slope's error: two periods of a low Q have none.
 const CERTAIN_FALL: f64 = 1.5;
-/// Rises, steady ones among them, that may be those of a random vibration. Why: fewer do not know a fourth moment.
-const RANDOM_RISES: usize = 10;
-/// Departure of a random vibration's kurtosis from that of a normal distribution. Why: four standard errors of 1,500
-/// independent samples, of which ten rises have some; the narrower the band, the more.
-const RANDOM_KURTOSIS: f64 = 0.5;
 /// A sixteenth of a driven stretch is left out at its end: to so much a bend is known.
 const END: usize = 16;
 /// Change of the amplitude, nepers, below which a stretch may be a drive's. Why: of few segments a slope's error would
@@ -42,11 +40,13 @@ const LEAST_FALL: f64 = 1e-3;
 /// # Method
 /// 1. The strongest oscillation sets the period. Each channel less its running mean over two periods, over its noise
 ///    (quietest stretches), squared and added: the envelope.
-/// 2. Starts by [`DecayTrigger`]; refined to the first sustained departure from the quiet line before.
+/// 2. Starts by [`DecayTrigger`]; of rises refined to the first sustained departure from the quiet line before.
 /// 3. End: where the ringing of two periods is smaller than the noise, or the next start.
 /// 4. First free sample: the later samples foretell it backwards by a linear recurrence; contact and saturation do not
 ///    obey it.
 /// 5. The decline of the strongest oscillation against its own error: what does not decline is [`Steady`].
+/// 6. Its size against the excursions of stationary noise with the same mean energy in its band: what is no larger is
+///    none.
 /// # Shapes
 /// `channels`: C slices of N samples of the same instants.
 /// # Units
@@ -84,37 +84,39 @@ pub fn find_decays(
         let next = starts.get(place + 1).copied().unwrap_or(record.envelope.samples());
         since = record.judge(onset, since, next, options, &mut found);
     }
-    found.random = record.is_random(&found);
+    if matches!(options.trigger, DecayTrigger::LargestRise) {
+        record.dismiss_walks(&mut found);
+        record.dismiss_excursions(&mut found);
+    }
     record.keep_largest(&mut found.decays, options.most);
     Ok(found)
 }
 
 /// A record as the search sees it.
-struct Record<'a> {
+pub(super) struct Record<'a> {
     /// Without the drive's.
-    channels: Vec<&'a [f64]>,
+    pub(super) channels: Vec<&'a [f64]>,
     numbers: Vec<usize>,
     drive: Option<&'a [f64]>,
     /// Channels without their drift.
-    swings: Vec<Vec<f64>>,
+    pub(super) swings: Vec<Vec<f64>>,
     /// Infinite for a channel that never changes: it takes no part.
-    noise_std: Vec<f64>,
+    pub(super) noise_std: Vec<f64>,
     clipped: Vec<Vec<Range<usize>>>,
-    envelope: Envelope,
+    pub(super) envelope: Envelope,
     /// Where a steady response begins to die.
     response_ends: Vec<usize>,
+    /// Hits of the force, ascending, of the trigger [`DecayTrigger::Force`] alone.
+    hits: Vec<Range<usize>>,
     /// Strongest oscillation, cycles per sample.
     frequency: f64,
-    rate_hz: f64,
+    pub(super) rate_hz: f64,
     all: Vec<&'a [f64]>,
 }
 
 impl<'a> Record<'a> {
     fn of(all: &[&'a [f64]], rate_hz: f64, options: &DecaySearchOptions) -> Self {
-        let drive = match options.trigger {
-            DecayTrigger::DriveEnd { channel } => channel,
-            _ => None,
-        };
+        let drive = options.trigger.left_out();
         let numbers: Vec<usize> = (0..all.len()).filter(|&c| Some(c) != drive).collect();
         let channels: Vec<&[f64]> = numbers.iter().map(|&c| all[c]).collect();
         let changes = |y: &&[f64]| y.iter().any(|value| *value != y[0]);
@@ -131,6 +133,10 @@ impl<'a> Record<'a> {
         let envelope = Envelope::new(&swings, &noise_std, period);
         let clipped = channels.iter().zip(&steps).map(|(y, &step)| clipped(y, step)).collect();
         let drive = drive.map(|c| all[c]);
+        let hits = match options.trigger {
+            DecayTrigger::Force { .. } => drive.map_or_else(Vec::new, |force| driven_stretches(force, period)),
+            _ => Vec::new(),
+        };
         Self {
             channels,
             numbers,
@@ -139,6 +145,7 @@ impl<'a> Record<'a> {
             noise_std,
             clipped,
             response_ends: ends_of_response(&envelope),
+            hits,
             envelope,
             frequency: pitch.strongest,
             rate_hz,
@@ -156,6 +163,7 @@ impl<'a> Record<'a> {
                 ends.iter().enumerate().map(|(i, &end)| later(end).filter(|&k| k < next(i)).unwrap_or(end)).collect()
             }
             (DecayTrigger::DriveEnd { .. }, None) => self.response_ends.clone(),
+            (DecayTrigger::Force { .. }, Some(_)) => self.hits.iter().map(|hit| hit.start).collect(),
             (DecayTrigger::LargestRise, _) => {
                 self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options))
             }
@@ -213,13 +221,20 @@ impl<'a> Record<'a> {
             _ => start,
         };
         let (end, why) = end(&self.envelope, onset, next);
+        let hit = self.hits.iter().find(|hit| hit.contains(&onset));
+        let end = match (hit, why) {
+            (Some(_), DecayEnd::NextEvent) => {
+                end.saturating_sub((BEFORE_HIT * period as f64).ceil() as usize).max(onset)
+            }
+            _ => end,
+        };
         let driven = if given { None } else { self.driven_until(onset, end, options, found) };
         let onset = driven.unwrap_or(onset);
         let first = match options.trigger {
             // the drive's end is the last forced sample
             DecayTrigger::DriveEnd { .. } => onset,
             _ if driven.is_some() => onset,
-            _ => self.begin(onset, end).free,
+            _ => self.begin(onset, end).free.max(hit.map_or(0, |hit| hit.end)),
         } + (options.skip_s * self.rate_hz).round() as usize;
         if first + LEAST_PERIODS * period > end {
             let reason = if end <= onset + period { DismissedReason::NoRinging } else { DismissedReason::TooShort };
@@ -299,21 +314,6 @@ impl<'a> Record<'a> {
             return why != DecayEnd::Noise && fall < 0.5;
         }
         decline.rate_per_s < decline.limit_per_s(options.decline_significance) || total < LEAST_FALL
-    }
-
-    /// Whether the decays may be those of a random vibration, which is normally distributed.
-    ///
-    /// Hits `x` decay times apart have a fourth moment of `1.5 x` times the second's square: 6 and more with quiet
-    /// between them. Of hits some two decay times apart it is a normal distribution's: they are taken for random.
-    fn is_random(&self, found: &DecaySearch) -> bool {
-        let kurtosis = |swing: &Vec<f64>| {
-            let moment = |power: i32| swing.iter().map(|y| y.powi(power)).sum::<f64>() / swing.len() as f64;
-            moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
-        };
-        let normal = |swing: &Vec<f64>| (kurtosis(swing) - 3.0).abs() < RANDOM_KURTOSIS;
-        let live = self.swings.iter().zip(&self.noise_std).filter(|(_, noise)| noise.is_finite());
-        let rises = found.decays.len() + found.steady.len();
-        !found.decays.is_empty() && rises >= RANDOM_RISES && live.map(|(swing, _)| swing).all(normal)
     }
 
     /// Leaves the `most` decays with the largest peaks over their noise, in order of time.

@@ -252,6 +252,38 @@ fn the_end_of_a_drive_starts_a_decay() {
 }
 
 #[test]
+fn hits_of_a_measured_force_are_decays_however_long_it_rings() {
+    for seed in 0..20_u64 {
+        let (rate, period) = (2000.0, 11.0 + seed as f64);
+        // the amplitude falls by a third to a half between hits
+        let apart = 700 + 31 * seed as usize;
+        let fall = (0.4 + 0.02 * seed as f64) / apart as f64;
+        let hits: Vec<usize> = (0..5).map(|i| 150 + i * apart + 7 * (i * i) % 23).collect();
+        let mut force = white_noise(150 + 6 * apart, 2e-3, 10 * seed);
+        let mut y = white_noise(force.len(), 1e-2, 10 * seed + 1);
+        for (i, &hit) in hits.iter().enumerate() {
+            let size = [1.0, 0.6, 0.9, 0.5, 0.8][i];
+            for (k, f) in [0.3, 0.9, 1.0, 0.4].into_iter().enumerate() {
+                force[hit + k] += size * f;
+                let ring = |t: f64| size * f * (-fall * t).exp() * (std::f64::consts::TAU * t / period).sin();
+                y[hit + k..].iter_mut().enumerate().for_each(|(t, y)| *y += ring(t as f64));
+            }
+        }
+        let trigger = DecayTrigger::Force { channel: 0 };
+        let options = DecaySearchOptions { trigger, ..DecaySearchOptions::default() };
+        let found = find_decays(&[&force, &y], rate, &options).unwrap();
+        let ranges: Vec<_> = found.decays.iter().map(|decay| decay.range.clone()).collect();
+        assert_eq!((found.channels.clone(), ranges.len()), (vec![1], 5), "seed {seed}: {ranges:?}, hits {hits:?}");
+        for (i, range) in ranges.iter().enumerate() {
+            let begins = (hits[i] + 4)..=(hits[i] + 4 + period as usize);
+            let next = hits.get(i + 1).copied().unwrap_or(force.len());
+            assert!(begins.contains(&range.start), "seed {seed}: {range:?}, hit at {}", hits[i]);
+            assert!(range.end <= next && range.end + period as usize > next, "seed {seed}: {range:?}, next at {next}");
+        }
+    }
+}
+
+#[test]
 fn what_cannot_be_searched_is_refused() {
     let y = white_noise(400, 1.0, 1);
     let defaults = DecaySearchOptions::default();

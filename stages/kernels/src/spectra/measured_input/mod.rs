@@ -1,13 +1,14 @@
 //! Frequency responses from input and output that were both measured.
 //!
 //! [`frequency_response`] averages blocks: hits of a hammer, the segments of a long record, the periods of an input that
-//! repeats itself ([`hits`], [`segments`], [`periods`]).
+//! repeats itself ([`hits`], [`segments`], [`periods()`]).
 
 mod blocks;
 mod estimate;
 mod follows;
 mod noise;
 mod periods;
+mod rings_on;
 #[cfg(test)]
 mod tests;
 
@@ -18,3 +19,4 @@ pub use blocks::{
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
 pub use follows::chance_coherence;
 pub use periods::{excited_share, period_samples, periods};
+pub use rings_on::rings_on;

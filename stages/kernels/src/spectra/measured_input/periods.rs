@@ -170,7 +170,7 @@ mod tests {
         }
         let bits: Vec<f64> = (0..2000).map(|k| if (k % 127 * (k % 127)) % 31 < 15 { 1.0 } else { -1.0 }).collect();
         assert_eq!(period_samples(&[&bits]), Some(127));
-        assert!(excited_share(&bits[..127]) > 0.8 && excited_share(&multisine(500, 5..30, 500, 1)) < 0.2);
+        assert!(excited_share(&white_noise(500, 1.0, 9)) > 0.8 && excited_share(&multisine(500, 5..30, 500, 1)) < 0.2);
         assert_eq!(period_samples(&[&[1.0; 500]]), None);
         assert_eq!(period_samples(&[]), None);
     }
