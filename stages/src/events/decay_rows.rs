@@ -120,6 +120,9 @@ pub(super) fn nothing_found(rows: &[Row], records: usize) -> StageError {
             "no decay is seen beside the steady line either: record the ringing after the drive has ended or without the \
              hum, or say where decays begin: trigger = { given = { times_s = [...] } }",
         ),
-        false => error.help("check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin"),
+        false => error.help(
+            "check the channel; `trigger = { given = { times_s = [...] } }` says where decays begin; `afmid new pipeline FILE \
+             --goal thermal` looks for a resonance in noise",
+        ),
     }
 }

@@ -105,6 +105,8 @@ pub(super) fn onsets(
             all.dedup();
             all
         }
-        _ => rises(envelope, options),
+        DecayTrigger::LargestRise | DecayTrigger::DriveEnd { .. } | DecayTrigger::Force { .. } => {
+            rises(envelope, options)
+        }
     }
 }
