@@ -107,7 +107,8 @@ fn offsets_and_what_was_before_the_onset_move_no_pole_beyond_its_error() {
         for (what, changed) in [("offset", offset), ("20 samples before", pair(record(16_384, 20)))] {
             let found = method(&changed);
             let far = ((found[0] - f) / f_std).abs().max(((found[2] - q) / q_std).abs());
-            assert!(far < 1.0, "{name}, {what}: {f} {q}, {found:?}");
+            // of the same noise beside the same motion: what differs are an offset and twenty samples of sixteen thousand
+            assert!(far < 0.5, "{name}, {what}: {f} {q}, {found:?}");
         }
         // the truth
         assert!((f - 61.0).abs() < 4.0 * f_std && (q - 25.0).abs() < 4.0 * q_std, "{name}: {f}({f_std}) {q}({q_std})");
