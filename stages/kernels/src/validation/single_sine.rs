@@ -39,7 +39,8 @@ const STEPS: usize = 12;
 /// # Shapes
 /// As many samples of input as of output, 64 at least; otherwise none.
 /// # Accuracy
-/// A sine of three periods and more. An input of two sines or of a sine and noise of more than 1 % of its energy is no single sine, whatever the output.
+/// A sine of three periods and more. An input of two sines or of a sine and noise of more than 1 % of its energy is no
+/// single sine, whatever the output.
 /// # Source
 /// L. Ljung, System Identification, 1999, 13.2: persistence of excitation.
 pub fn single_sine(input: &[f64], output: &[f64]) -> Option<SingleSine> {
