@@ -14,6 +14,9 @@ import h5py
 import nptdms
 import numpy as np
 import pandas
+import pyarrow
+import pyarrow.feather
+import pyarrow.parquet
 import scipy.io
 
 RATE_HZ = 10000.0
@@ -113,6 +116,36 @@ def npy(path, rule, a, b, unit, shared):
 
 def mat(path, rule, a, b, unit, shared):
     scipy.io.savemat(path, arrays(rule, a, b, unit, shared))
+
+
+def table(rule, a, b, unit, shared):
+    """A table of Arrow; none where the sensors have different numbers of samples."""
+    if rule in ("two rates", "stated start"):
+        return None
+    if rule == "wrong rate":
+        return pyarrow.table({"A": a[1], "B": b[1]}, metadata={"sample_rate_hz": "8000"})
+    if not shared:
+        columns = arrays(rule, a, b, unit, shared)
+        struct = lambda each: pyarrow.StructArray.from_arrays(list(each.values()), list(each))
+        return pyarrow.table({name: struct(each) for name, each in columns.items()})
+    columns = arrays(rule, a, b, "", shared)
+    units = {"t": {"unit": unit}} if unit else {}
+    fields = [pyarrow.field(name, pyarrow.from_numpy_dtype(values.dtype), metadata=units.get(name)) for name, values in columns.items()]
+    return pyarrow.table(list(columns.values()), pyarrow.schema(fields))
+
+
+def arrow(path, *rule):
+    made = table(*rule)
+    if made is None:
+        return False
+    pyarrow.feather.write_feather(made, path, chunksize=3000)
+
+
+def parquet(path, *rule):
+    made = table(*rule)
+    if made is None:
+        return False
+    pyarrow.parquet.write_table(made, path, row_group_size=3000)
 
 
 def hdf5(path, rule, a, b, unit, shared):
@@ -234,6 +267,8 @@ WRITERS = {
     "text": (text, "csv"),
     "npz": (npz, "npz"),
     "npy": (npy, "npy"),
+    "parquet": (parquet, "parquet"),
+    "arrow": (arrow, "arrow"),
     "mat": (mat, "mat"),
     "hdf5": (hdf5, "h5"),
     "netcdf": (netcdf, "nc"),

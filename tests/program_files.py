@@ -16,6 +16,9 @@ import hdf5storage
 import nptdms
 import numpy as np
 import pandas
+import polars
+import pyarrow
+import pyarrow.feather
 import pyuff
 import scipy.io
 import soundfile
@@ -126,6 +129,26 @@ def of_pyuff(folder, y, t):
         pyuff.UFF(str(folder / f"pyuff_{name}.uff")).write_sets(dataset, mode="add")
 
 
+def of_arrow(folder, y, t):
+    """Tables of Arrow by its own library, pandas and Polars, and one of Parquet."""
+    frame = pandas.DataFrame({"time": t, "acc": y})
+    frame.to_feather(folder / "pandas.feather")
+    frame.assign(time=stamps(len(y))).to_feather(folder / "pandas_datetime.feather", compression="zstd")
+    frame.set_index("time").to_parquet(folder / "pandas.parquet")
+    duration = pyarrow.duration("us")
+    acc = pyarrow.field("acc", pyarrow.float64(), metadata={"unit": "m/s^2"})
+    columns = [pyarrow.array(stamps(len(y)) - BEGAN).cast(duration), y]
+    made = pyarrow.table(columns, pyarrow.schema([("elapsed", duration), acc]))
+    with pyarrow.ipc.new_file(folder / "pyarrow.arrow", made.schema) as writer:
+        writer.write_table(made, max_chunksize=700)
+    packed = pyarrow.ipc.IpcWriteOptions(compression="lz4")
+    with pyarrow.ipc.new_stream(folder / "pyarrow.arrows", made.schema, options=packed) as writer:
+        writer.write_table(made, max_chunksize=700)
+    table = polars.DataFrame({"time": t, "acc": y})
+    table.write_ipc(folder / "polars.ipc")
+    table.write_ipc(folder / "polars_zstd.ipc", compression="zstd")
+
+
 def of_numpy(folder, y, t):
     np.savez(folder / "plain.npz", t=t, acc=y)
     np.savez_compressed(folder / "packed.npz", fs=RATE_HZ, acc=y)
@@ -147,6 +170,7 @@ def main():
     of_nptdms(folder, y, t)
     of_soundfile(folder, y)
     of_pyuff(folder, y, t)
+    of_arrow(folder, y, t)
     of_numpy(folder, y, t)
     said = {"alone.npy": ["--rate", "5000"]}
     files = {path.name: said.get(path.name, []) for path in sorted(folder.iterdir())}

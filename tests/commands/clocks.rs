@@ -126,7 +126,7 @@ fn compare_with_page(rows: &[(String, Vec<(String, &str)>)]) {
     assert!(there == table, "docs/archives.md differs; UPDATE_EXPECTED=1 writes it:\n{table}");
 }
 
-/// One decay as some forty programs write it: the same modes from each, and a rate is given only where the file has none.
+/// One decay as some fifty programs write it: the same modes from each, and a rate is given only where the file has none.
 #[test]
 fn one_decay_gives_the_same_modes_from_every_program() {
     let scratch = tempfile::tempdir().expect("a folder");

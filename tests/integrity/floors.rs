@@ -32,7 +32,7 @@ const CRATES: [Crate; 5] = [
             &["grid"],
             &["together"],
             &["archive", "axes", "joined", "measurement", "responses"],
-            &["labels", "resample"],
+            &["columnar", "labels", "resample"],
             &["listing"],
             &["readers"],
         ],

@@ -8,6 +8,7 @@ mod archive;
 mod axes;
 mod budget;
 mod calendar;
+mod columnar;
 mod evenness;
 mod facts;
 mod fail;

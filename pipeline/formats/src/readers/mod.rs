@@ -9,6 +9,7 @@ use std::path::Path;
 
 use crate::{Contents, Format, FormatError, Row, fail};
 
+pub mod arrow;
 pub mod igor;
 pub mod jpk;
 pub mod keysight;
@@ -60,6 +61,7 @@ const FORMATS: &[Known] = &[
     Known::of::<numpy::Npy>(),
     Known::of::<numpy::Npz>(),
     Known::of::<parquet::Parquet>(),
+    Known::of::<arrow::Arrow>(),
     Known::of::<jpk::JpkForce>(),
     Known::of::<nanoscope::Nanoscope>(),
     Known::of::<wav::Wav>(),

@@ -1,5 +1,6 @@
 //! Tests on files: built here, written by the reference readers' own writers (tests/data), and real ones.
 
+mod arrow;
 mod clocks;
 mod igor;
 mod jpk;

@@ -3,22 +3,8 @@
 //! Source: Apache Parquet, "Parquet encoding definitions"
 //! (<https://parquet.apache.org/docs/file-format/data-pages/encodings>).
 
-use super::compact::{varint, zigzag};
-
-/// Bits of a number that are taken from a stream of bits, the lowest first.
-fn bits(bytes: &[u8], first: usize, width: u32) -> Option<u64> {
-    let mut number = 0_u64;
-    let mut have = 0;
-    while have < width {
-        let at = first + have as usize;
-        let (byte, from) = (*bytes.get(at / 8)?, (at % 8) as u32);
-        let some = (8 - from).min(width - have);
-        let part = u64::from(byte >> from) & ((1_u64 << some) - 1);
-        number |= part << have;
-        have += some;
-    }
-    Some(number)
-}
+use super::compact::zigzag;
+use crate::columnar::{bits, varint};
 
 /// `count` numbers of `width` bits, as runs of one number and as packed bits in turn. None: damaged.
 pub(super) fn runs(mut bytes: &[u8], width: u32, count: usize) -> Option<Vec<u32>> {
@@ -51,11 +37,6 @@ pub(super) fn runs(mut bytes: &[u8], width: u32, count: usize) -> Option<Vec<u32
         }
     }
     Some(numbers)
-}
-
-/// `count` truths of a bit each, in bytes.
-pub(super) fn truths(bytes: &[u8], count: usize) -> Option<Vec<u8>> {
-    (0..count).map(|at| bits(bytes, at, 1).map(|bit| bit as u8)).collect()
 }
 
 /// Numbers of `width` bytes whose first bytes lie together, then their second ones, and so on.
@@ -112,6 +93,7 @@ pub(super) fn differences(mut bytes: &[u8], width: usize, count: usize) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::columnar::truths;
 
     #[test]
     fn runs_packed_bits_and_differences() {
@@ -121,7 +103,7 @@ mod tests {
         assert_eq!(runs(&[4], 0, 2).unwrap(), [0, 0]);
         assert_eq!((runs(&[0, 1], 3, 8), runs(&[3, 0x88], 3, 8), runs(&[], 3, 1)), (None, None, None));
         assert_eq!(runs(&[0xff; 20], 32, 1000), None);
-        assert_eq!(truths(&[0b101], 3).unwrap(), [1, 0, 1]);
+        assert_eq!(truths(&[0b101], 0, 3).unwrap(), [1, 0, 1]);
         assert_eq!(joined_streams(&[1, 2, 3, 4, 5, 6], 2, 3).unwrap(), [1, 4, 2, 5, 3, 6]);
         assert_eq!(joined_streams(&[1, 2], 2, 3), None);
         // the example of the definition: 7, 5, 3, 1, 2, 3, 4, 5

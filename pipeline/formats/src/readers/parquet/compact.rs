@@ -2,6 +2,8 @@
 //!
 //! Source: Apache Thrift, "Thrift compact protocol encoding".
 
+use crate::columnar::varint;
+
 /// Structs in structs beyond this are refused, so that no file can exhaust the stack.
 const DEEPEST: usize = 16;
 
@@ -162,18 +164,6 @@ impl<'a> Reading<'a> {
         }
         Some(Value::Other)
     }
-}
-
-/// A number in groups of seven bits, the lowest first, and how many bytes it has. None: cut off, or beyond 64 bits.
-pub(super) fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
-    let mut number = 0_u64;
-    for (at, &byte) in bytes.iter().enumerate().take(10) {
-        number |= u64::from(byte & 127).checked_shl(7 * at as u32)?;
-        if byte < 128 {
-            return Some((number, at + 1));
-        }
-    }
-    None
 }
 
 /// 0, -1, 1, -2, ... of 0, 1, 2, 3, ...

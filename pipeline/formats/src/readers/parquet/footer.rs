@@ -3,7 +3,8 @@
 //! Source: Apache Parquet, "parquet.thrift" and "Logical types" (<https://parquet.apache.org/docs/file-format>).
 
 use super::compact::Value;
-use super::inflate::Codec;
+use crate::columnar::arrow_schema::names_unit;
+use crate::columnar::{Codec, DEEPEST, MOST_COLUMNS, MOST_PATH_BYTES, What};
 use crate::number::Number;
 use crate::opened::Opened;
 use crate::{FormatError, fail};
@@ -15,28 +16,6 @@ const TAIL_BYTES: u64 = 8;
 
 /// A description of a thousand columns in five hundred row groups has about as many.
 const MOST_FOOTER_BYTES: u64 = 64 << 20;
-
-/// More columns are no recording.
-const MOST_COLUMNS: usize = 1 << 16;
-
-/// Groups of columns in groups beyond this are refused.
-const DEEPEST: usize = 32;
-
-/// Names of a column and of the groups that it is in: with `MOST_COLUMNS` they bound the memory.
-const MOST_PATH_BYTES: usize = 1024;
-
-/// What the numbers of a column are.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum What {
-    /// Numbers as they are.
-    Plain,
-    /// Numbers times this: decimal fractions.
-    Scaled(f64),
-    /// Times of day, in these seconds.
-    TimeOfDay(f64),
-    /// Moments, as so many parts of a second since 1970, and whether they are in UTC.
-    Moments { per_second: i64, utc: bool },
-}
 
 /// A column of the schema.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +46,6 @@ pub(super) struct Chunk {
 /// A file's description.
 #[derive(Debug)]
 pub(super) struct Footer {
-    pub(super) rows: u64,
     pub(super) columns: Vec<Column>,
     /// Chunks of each column, row group by row group.
     pub(super) chunks: Vec<Vec<Chunk>>,
@@ -117,7 +95,7 @@ impl Footer {
             return Err(format!("the row groups have {in_groups} rows of {rows}"));
         }
         let texts = whole.list(5).iter().filter_map(|pair| Some((pair.text(1)?, pair.text(2)?))).collect();
-        Ok(Self { rows, columns, chunks, texts })
+        Ok(Self { columns, chunks, texts })
     }
 }
 
@@ -137,8 +115,8 @@ fn chunk_of(chunk: &Value, rows: u64, end: u64) -> Result<Chunk, String> {
         return Err(format!("a column has {bytes} bytes from byte {at}, its pages end before byte {end}"));
     }
     let texts = || about.list(8).iter().filter_map(|pair| Some((pair.text(1)?, pair.text(2)?)));
-    let unit = texts().find(|(name, _)| super::names_unit(name)).map(|(_, unit)| unit);
-    Ok(Chunk { rows, at, bytes, codec: Codec::of(about.number(4).unwrap_or(-1)), unit })
+    let unit = texts().find(|(name, _)| names_unit(name)).map(|(_, unit)| unit);
+    Ok(Chunk { rows, at, bytes, codec: codec_of(about.number(4).unwrap_or(-1)), unit })
 }
 
 /// The groups that a column is in.
@@ -203,7 +181,7 @@ fn kind_of(element: &Value) -> Result<(Number, What), String> {
         (kind, _) => return Err(format!("values of the unknown type {kind:?}")),
     };
     let what = match logical {
-        Logical::Decimal(scale) => What::Scaled(10_f64.powi(-scale)),
+        Logical::Decimal(scale) => What::decimals(scale),
         Logical::Date => return Err("dates".to_owned()),
         Logical::Time(per_second) => What::TimeOfDay(1.0 / per_second as f64),
         Logical::Moments { per_second, utc } if number == Number::I64 => What::Moments { per_second, utc },
@@ -243,7 +221,7 @@ impl Logical {
             _ => None,
         };
         Some(match which {
-            5 => Self::Decimal(scale(about.number(1))),
+            5 => Self::Decimal(places(about.number(1))),
             6 => Self::Date,
             7 => Self::Time(per_second(about.field(2))?),
             8 => Self::Moments { per_second: per_second(about.field(2))?, utc: about.truth(1).unwrap_or(false) },
@@ -256,7 +234,7 @@ impl Logical {
     /// The description before.
     fn converted(element: &Value) -> Self {
         match element.number(6) {
-            Some(5) => Self::Decimal(scale(element.number(7))),
+            Some(5) => Self::Decimal(places(element.number(7))),
             Some(6) => Self::Date,
             Some(7) => Self::Time(1000),
             Some(8) => Self::Time(1_000_000),
@@ -268,7 +246,22 @@ impl Logical {
     }
 }
 
-/// Decimal places; 18 digits have no more.
-fn scale(scale: Option<i64>) -> i32 {
-    scale.and_then(|scale| i32::try_from(scale).ok()).unwrap_or(0).clamp(0, 18)
+/// Places of a decimal fraction.
+fn places(places: Option<i64>) -> i32 {
+    places.and_then(|places| i32::try_from(places).ok()).unwrap_or(0).max(0)
+}
+
+/// How a column is packed, by its number in a file. Error: the name of one that is not unpacked.
+fn codec_of(number: i64) -> Result<Codec, &'static str> {
+    Err(match number {
+        0 => return Ok(Codec::Plain),
+        1 => return Ok(Codec::Snappy),
+        2 => return Ok(Codec::Gzip),
+        7 => return Ok(Codec::Lz4),
+        3 => "LZO",
+        4 => "Brotli",
+        5 => "LZ4 in Hadoop's frames",
+        6 => "Zstandard",
+        _ => "an unknown codec",
+    })
 }

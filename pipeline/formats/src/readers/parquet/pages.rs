@@ -4,10 +4,10 @@
 //! page of data says which values are missing and has the others as they are, as numbers of dictionary entries, in
 //! split streams of bytes, or as differences.
 
-use super::codes::{differences, joined_streams, runs, truths};
+use super::codes::{differences, joined_streams, runs};
 use super::compact::Value;
 use super::footer::Chunk;
-use super::inflate::Codec;
+use crate::columnar::{Codec, Values, truths};
 use crate::number::Number;
 use flate2::Crc;
 
@@ -20,15 +20,6 @@ pub(super) struct Reading {
     pub(super) codec: Codec,
     /// Bytes that the pages may come to.
     pub(super) most_bytes: u64,
-}
-
-/// The values of a chunk.
-#[derive(Debug, Default, PartialEq)]
-pub(super) struct Values {
-    /// Those that are there, in little-endian order.
-    pub(super) bytes: Vec<u8>,
-    /// Which rows have one.
-    pub(super) there: Vec<bool>,
 }
 
 /// Kinds of pages.
@@ -146,7 +137,7 @@ impl Reading {
         // the only numbers of one byte are truths
         let is_truth = width == 1;
         match page.encoding {
-            0 if is_truth => truths(bytes, count),
+            0 if is_truth => truths(bytes, 0, count),
             0 => bytes.get(..width.checked_mul(count)?).map(<[u8]>::to_vec),
             2 | 8 => entries(bytes, dictionary, width, count),
             3 if is_truth => {
