@@ -19,6 +19,7 @@ import pandas
 import polars
 import pyarrow
 import pyarrow.feather
+import pyarrow.parquet
 import pyuff
 import scipy.io
 import soundfile
@@ -130,7 +131,7 @@ def of_pyuff(folder, y, t):
 
 
 def of_arrow(folder, y, t):
-    """Tables of Arrow by its own library, pandas and Polars, and one of Parquet."""
+    """Tables of Arrow by its own library, pandas and Polars, and of Parquet by the three."""
     frame = pandas.DataFrame({"time": t, "acc": y})
     frame.to_feather(folder / "pandas.feather")
     frame.assign(time=stamps(len(y))).to_feather(folder / "pandas_datetime.feather", compression="zstd")
@@ -147,6 +148,9 @@ def of_arrow(folder, y, t):
     table = polars.DataFrame({"time": t, "acc": y})
     table.write_ipc(folder / "polars.ipc")
     table.write_ipc(folder / "polars_zstd.ipc", compression="zstd")
+    # packed with Zstandard
+    table.write_parquet(folder / "polars.parquet", row_group_size=700)
+    pyarrow.parquet.write_table(made, folder / "pyarrow.parquet", compression="brotli")
 
 
 def of_numpy(folder, y, t):

@@ -1,4 +1,7 @@
-"""Writes the small Arrow files in tests/data and the seeds in fuzz/corpus/arrow. Needs pyarrow, pandas and polars. Run: python tests/make_arrow.py"""
+"""Writes the small Arrow files in tests/data and the seeds in fuzz/corpus/arrow.
+
+Needs pyarrow, pandas and polars. Run: python tests/make_arrow.py
+"""
 
 import decimal
 import pathlib

@@ -1,9 +1,13 @@
-"""Writes the small Parquet files in tests/data and the seeds in fuzz/corpus/parquet. Needs pyarrow and pandas. Run: python tests/make_parquet.py"""
+"""Writes the small Parquet files in tests/data and the seeds in fuzz/corpus/parquet.
+
+Needs pyarrow, pandas and polars. Run: python tests/make_parquet.py
+"""
 import decimal
 import pathlib
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -37,6 +41,8 @@ types = pa.table(columns)
 for name, options in {
     "snappy": {},
     "gzip": {"compression": "gzip", "row_group_size": 25},
+    "zstd": {"compression": "zstd", "row_group_size": 25},
+    "brotli": {"compression": "brotli", "data_page_version": "2.0", "row_group_size": 25},
     "lz4": {"compression": "lz4", "data_page_version": "2.0", "row_group_size": 31},
     "plain": {"compression": "none", "use_dictionary": False, "data_page_size": 64, "write_page_checksum": True},
     "streams": {"compression": "snappy", "use_dictionary": False, "use_byte_stream_split": ["f16", "f32", "f64", "i32"],
@@ -46,6 +52,8 @@ for name, options in {
         options["column_encoding"] |= {c: "BYTE_STREAM_SPLIT" for c in options.pop("use_byte_stream_split")}
     pq.write_table(types, data / f"types_{name}.parquet", store_schema=False, write_statistics=False, store_decimal_as_integer=name != "plain", **options)
 pq.write_table(types.select(["f64"]), data / "zstd.parquet", compression="zstd")
+# packed with Zstandard, as Polars does by itself
+pl.from_arrow(types.drop(["decimal"])).write_parquet(data / "types_polars.parquet", row_group_size=25)
 
 y = np.cos(n / 5)
 fields = [pa.field("t", pa.timestamp("us", "UTC")), pa.field("acc", pa.float64(), metadata={"unit": "m/s^2", "note": "x"}),
@@ -68,5 +76,7 @@ pq.write_table(pa.table({"y": y}).replace_schema_metadata({"sample_rate_hz": "25
 
 small = pa.table({"t": pa.array(moments[:9]), "y": pa.array([None, *y[:8]]), "k": pa.array(n[:9], pa.int32())})
 pq.write_table(small, corpus / "snappy.parquet", write_statistics=False)
+for name in ["zstd", "brotli"]:
+    pq.write_table(small, corpus / f"{name}.parquet", compression=name, write_statistics=False)
 pq.write_table(small, corpus / "pages2.parquet", compression="lz4", data_page_version="2.0", row_group_size=4, use_dictionary=["k"],
                column_encoding={"t": "DELTA_BINARY_PACKED"}, write_statistics=False)

@@ -1,8 +1,9 @@
 //! Bytes as they were before they were packed.
 //!
-//! Source: RFC 1952 (gzip), RFC 8878 (Zstandard); [`super::blocks`] has those of Snappy and LZ4.
+//! Source: RFC 1952 (gzip), RFC 7932 (Brotli), RFC 8878 (Zstandard); [`super::blocks`] has those of Snappy and LZ4.
 
 use super::blocks::{lz4, lz4_frame, snappy};
+use brotli_decompressor::Decompressor;
 use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::StreamingDecoder;
 use std::io::Read;
@@ -10,12 +11,16 @@ use std::io::Read;
 /// Zstandard looks back by at most this in data of a lesser length: what RFC 8878 lets every decoder have.
 const LEAST_WINDOW_BYTES: u64 = 8 << 20;
 
+/// Packed bytes that the decoder of Brotli takes at once.
+const BROTLI_PIECE_BYTES: usize = 1 << 12;
+
 /// How bytes are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Codec {
     Plain,
     Snappy,
     Gzip,
+    Brotli,
     Lz4,
     Lz4Frame,
     Zstandard,
@@ -30,6 +35,7 @@ impl Codec {
             Self::Lz4 => lz4(packed, length)?,
             Self::Lz4Frame => lz4_frame(packed, length)?,
             Self::Gzip => at_most(MultiGzDecoder::new(packed), length)?,
+            Self::Brotli => at_most(Decompressor::new(packed, BROTLI_PIECE_BYTES), length)?,
             Self::Zstandard => zstandard(packed, length)?,
         };
         (bytes.len() == length).then_some(bytes)
@@ -64,8 +70,8 @@ mod tests {
         assert_eq!(Codec::Snappy.unpack(&snappy, 10).unwrap(), b"abcdabcdab");
         let lz4 = [0x42, b'a', b'b', b'c', b'd', 4, 0, 0x10, b'x'];
         assert_eq!(Codec::Lz4.unpack(&lz4, 11).unwrap(), b"abcdabcdabx");
-        let all = [Codec::Plain, Codec::Snappy, Codec::Gzip, Codec::Lz4, Codec::Lz4Frame, Codec::Zstandard];
-        for codec in all {
+        use Codec::{Brotli, Gzip, Lz4, Lz4Frame, Plain, Snappy, Zstandard};
+        for codec in [Plain, Snappy, Gzip, Brotli, Lz4, Lz4Frame, Zstandard] {
             for bytes in [&snappy[..], &lz4[..], &[0xff; 40], &[0; 3]] {
                 for cut in 0..bytes.len() {
                     assert_eq!(codec.unpack(&bytes[..cut], 10_000), None);
@@ -78,7 +84,10 @@ mod tests {
         }
         // more than was promised
         assert_eq!(Codec::Snappy.unpack(&snappy, 9), None);
-        // 4000 times "a", as libzstd packs it
+        // 4000 times "a", as the programs of those who made the codecs pack it
+        let a = [27, 159, 15, 0, 36, 194, 226, 177, 64, 178, 14, 0, 0];
+        assert_eq!(Codec::Brotli.unpack(&a, 4000).unwrap(), [b'a'; 4000]);
+        assert_eq!((Codec::Brotli.unpack(&a, 3999), Codec::Brotli.unpack(&a[..10], 4000)), (None, None));
         let a = [40, 181, 47, 253, 96, 160, 14, 77, 0, 0, 16, 97, 97, 1, 0, 155, 247, 1, 22];
         assert_eq!(Codec::Zstandard.unpack(&a, 4000).unwrap(), [b'a'; 4000]);
         assert_eq!((Codec::Zstandard.unpack(&a, 3999), Codec::Zstandard.unpack(&a[..15], 4000)), (None, None));

@@ -1,4 +1,5 @@
-//! Files that pyarrow 26.0.1 and pandas 3.1.1 wrote (tests/make_parquet.py, where the numbers are), and damaged ones.
+//! Files that pyarrow 26.0.1, pandas 3.1.1 and Polars 2.1.0 wrote (tests/make_parquet.py, where the numbers are), and
+//! damaged ones.
 
 use crate::support::{Random, channel, locations, open_bytes, remarked, samples, survive, values, written};
 use afmid_formats::readers::parquet::Parquet;
@@ -41,10 +42,10 @@ fn every_type_packed_and_coded_in_every_way() {
         ("/decimal", "int32", of(|n| n * 0.01)),
         ("/inner.x", "float64", of(|n| n * 0.5)),
     ];
-    for name in ["snappy", "gzip", "lz4", "plain", "streams"] {
+    for name in ["snappy", "gzip", "zstd", "brotli", "lz4", "plain", "streams", "polars"] {
         let contents = open(&format!("types_{name}"));
         // decimals of nine digits lie in bytes unless asked for otherwise
-        let decimals = remarked(&contents, "/decimal holds decimal fractions of many digits");
+        let decimals = name == "polars" || remarked(&contents, "/decimal holds decimal fractions of many digits");
         for (location, stored_as, wanted) in &wanted {
             if *location == "/decimal" && decimals {
                 continue;
@@ -63,9 +64,17 @@ fn every_type_packed_and_coded_in_every_way() {
 
 #[test]
 fn other_packings_are_named() {
-    let contents = open("zstd");
-    assert!(contents.channels.is_empty());
-    assert!(remarked(&contents, "/f64 is left out: it is packed with Zstandard"), "{:?}", contents.remarks);
+    assert_eq!(values(channel(&open("zstd"), "/f64")), of(|n| n * 0.1));
+    let mut bytes = std::fs::read(written("zstd.parquet")).unwrap();
+    // the number of the packing, twice, behind the name of the column
+    let place = bytes.windows(6).position(|word| word == b"f64\x15\x0c\x16").unwrap() + 4;
+    for (number, name) in [(3, "LZO"), (5, "LZ4 in Hadoop's frames"), (9, "an unknown codec")] {
+        bytes[place] = 2 * number;
+        let contents = open_bytes::<Parquet>("x.parquet", &bytes).1.unwrap();
+        assert!(contents.channels.is_empty());
+        let remark = format!("/f64 is left out: it is packed with {name}, wanted Snappy");
+        assert!(remarked(&contents, &remark), "{:?}", contents.remarks);
+    }
 }
 
 #[test]
@@ -115,7 +124,7 @@ fn numbers_that_may_be_missing_are_of_one_type_throughout() {
 
 #[test]
 fn damaged_files_do_no_harm() {
-    for name in ["types_lz4", "types_streams", "types_plain", "named", "pandas_moments"] {
+    for name in ["types_lz4", "types_zstd", "types_brotli", "types_streams", "types_plain", "named", "pandas_moments"] {
         let sound = std::fs::read(written(&format!("{name}.parquet"))).unwrap();
         survive::<Parquet>("x.parquet", &sound, 200, 2000, 16 << 20);
     }

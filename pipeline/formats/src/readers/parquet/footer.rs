@@ -257,11 +257,11 @@ fn codec_of(number: i64) -> Result<Codec, &'static str> {
         0 => return Ok(Codec::Plain),
         1 => return Ok(Codec::Snappy),
         2 => return Ok(Codec::Gzip),
+        4 => return Ok(Codec::Brotli),
+        6 => return Ok(Codec::Zstandard),
         7 => return Ok(Codec::Lz4),
         3 => "LZO",
-        4 => "Brotli",
         5 => "LZ4 in Hadoop's frames",
-        6 => "Zstandard",
         _ => "an unknown codec",
     })
 }

@@ -9,7 +9,8 @@
 //! - Units from the metadata of a field, `unit` or `units`, which Arrow keeps in a text of the file. Rates from texts
 //!   of the file that are named like one (`sample_rate_hz`, `fs`, `dt`, ...), else from columns of times.
 //! - Checksums of pages are verified where there are some.
-//! - Unpacked or with Snappy, gzip, LZ4 (raw); coded plainly, by a dictionary, as differences, in split streams.
+//! - Unpacked or with Snappy, gzip, Brotli, Zstandard, LZ4 (raw); coded plainly, by a dictionary, as differences, in
+//!   split streams.
 //!
 //! The crate `parquet`, with which tables are written, is not used to read: it reserves memory for as many items as a
 //! damaged description claims, which ends the program, and it stops by panics where pages are not as described.
@@ -42,8 +43,9 @@ impl Format for Parquet {
     const ROW: Row = Row {
         name: "parquet",
         title: "Apache Parquet",
-        reads: "integers, float16 to float64, truths, decimals, in structs too; missing ones as NaN; Snappy, gzip, LZ4",
-        leaves_out: "lists, texts, dates; Zstandard and Brotli; encrypted files",
+        reads: "integers, float16 to float64, truths, decimals, in structs too; missing ones as NaN; Snappy, \
+                gzip, Brotli, Zstandard, LZ4",
+        leaves_out: "lists, texts, dates; LZO, LZ4 in Hadoop's frames; encrypted files",
         described_by: "Apache Parquet, \"File format\"; Apache Arrow, \"Schema.fbs\"",
         clock: "columns of moments and of times; texts of the file named `fs`, `dt`, ...",
         unit: "the metadata `unit` or `units` of a field",
@@ -77,7 +79,8 @@ impl Format for Parquet {
 fn described_by(column: &Column, chunks: &[Chunk], units: &HashMap<String, Unit>) -> Described {
     let name = column.path.join(".");
     let packed = chunks.iter().find_map(|chunk| chunk.codec.err());
-    let left_out = packed.map(|codec| format!("it is packed with {codec}, wanted Snappy, gzip or LZ4"));
+    let left_out =
+        packed.map(|codec| format!("it is packed with {codec}, wanted Snappy, gzip, Brotli, Zstandard or LZ4"));
     let own = chunks.iter().find_map(|chunk| chunk.unit.clone());
     let of_field = units.get(&name);
     let of_duration = of_field.is_some_and(|unit| unit.of_duration);
