@@ -180,3 +180,27 @@ fn linear_pairs_follow_no_laws() {
     let one = pairs_with_laws(&[0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8], 1, 30..60);
     assert!(two + one <= 1, "{two} of two channels, {one} of one");
 }
+
+#[test]
+fn a_close_pair_in_much_noise_is_no_mode_that_moves() {
+    let (mut moving, mut off) = (0, 0);
+    for seed in 0..24_u64 {
+        let decay = |f: f64, amplitude: f64, k: usize| {
+            let t = k as f64 / 2000.0;
+            amplitude * (-0.003 * TAU * f * t).exp() * (TAU * f * t).sin()
+        };
+        let noise = white_noise(7200, 1.0, 400 + seed);
+        let y = (0..7200).map(|k| decay(80.0, 10.0, k) + decay(80.3, 8.0, k) + noise[k]).collect();
+        let found = followed(&[vec![y]], 1.0 / 2000.0).unwrap();
+        let rows = found.fit.modes();
+        moving += usize::from(!found.along.is_empty());
+        let near = |f: f64| rows.iter().any(|mode| (mode.frequency_hz.value - f).abs() < 4.0 * mode.frequency_hz.std);
+        off += usize::from(rows.len() != 2 || !near(80.0) || !near(80.3));
+        if rows.len() != 2 {
+            println!("seed {seed}: {rows:?}, {:?}", found.along.first().map(|along| &along.laws));
+        }
+    }
+    println!("of 24: {moving} said to follow laws, {off} not the two modes");
+    // where noise makes one law as good as two modes it may be taken: once in a hundred
+    assert!(moving <= 1 && off <= 2, "{moving} {off}");
+}

@@ -8,7 +8,7 @@ use crate::ringdown::moving::model::{MULTIPLES, Mode};
 use crate::ringdown::moving::result::Follows;
 use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit};
 use crate::ringdown::moving::select::{Rules, selected};
-use crate::ringdown::moving::terms::{Law, TERMS, values};
+use crate::ringdown::moving::terms::{Law, TERMS, Term, values};
 use faer::c64;
 
 /// Probability of as much round a line under noise alone below which neither model holds.
@@ -20,8 +20,10 @@ const WEAK: f64 = 0.15;
 /// Share of a line's energy that a multiple of a phase explains from which on it is one: the power of the amplitude is
 /// that of weak nonlinearity.
 const EXPLAINED: f64 = 0.95;
-/// Terms beside the constants with which one mode is a plainer account than two exponentials.
-const PLAIN_TERMS: usize = 2;
+/// Terms that one cause adds to the damping, one of them, and to the frequency: drag, cubic damping, dry friction; a cubic
+/// spring, the sine of an angle, a spring of a power law.
+const OF_DAMPING: [Term; 3] = [Term::Linear, Term::Square, Term::Inverse];
+const OF_FREQUENCY: [&[Term]; 3] = [&[Term::Square], &[Term::Square, Term::Fourth], &[Term::Log]];
 /// Difference of BIC from which on exponentials replace a mode that leaves no more than noise.
 const DECISIVE: f64 = 10.0;
 /// Gain of BIC from which on a linear mode stands beside one that moves.
@@ -136,8 +138,7 @@ impl Search<'_> {
             }
             let own = self.bic(&best);
             let mode = &best.modes[number];
-            let terms = mode.damping.terms.len() + mode.frequency.terms.len() - 2;
-            let plain = !lacks && terms <= PLAIN_TERMS;
+            let plain = !lacks && is_of_one_cause(mode);
             let other = self.sum_of(&best, line, number, plain);
             let beside = if left.p_value < UNEXPLAINED { self.beside(&best, line, number) } else { None };
             of_lines[line].bic_difference = other.as_ref().map(|other| own - self.bic(other));
@@ -187,8 +188,8 @@ impl Search<'_> {
         starts.take(3).filter_map(with).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
     }
 
-    /// The best sum of exponentials in place of a mode. Where the mode leaves noise alone with few terms (`plain`),
-    /// few trials.
+    /// The best sum of exponentials in place of a mode. Where the mode leaves noise alone with terms of a common cause
+    /// (`plain`), few trials.
     fn sum_of(&self, best: &Fit, line: usize, number: usize, plain: bool) -> Option<Fit> {
         let mode = &best.modes[number];
         let others: Vec<Mode> =
@@ -283,6 +284,15 @@ impl Search<'_> {
         }
         starts
     }
+}
+
+/// Whether a common cause makes both laws.
+fn is_of_one_cause(mode: &Mode) -> bool {
+    let more = |law: &Law| law.terms.iter().copied().filter(|term| *term != Term::One).collect::<Vec<Term>>();
+    let (damping, frequency) = (more(&mode.damping), more(&mode.frequency));
+    damping.len() <= 1
+        && damping.iter().all(|term| OF_DAMPING.contains(term))
+        && (frequency.is_empty() || OF_FREQUENCY.iter().any(|terms| frequency.iter().all(|term| terms.contains(term))))
 }
 
 /// Replaces a line's mode by exponentials, which are the last modes of the fit.
