@@ -1,7 +1,9 @@
 //! What recordings look like: snap-offs of a lever, free decays, measured input and output, a steady oscillation.
 
 use afmid_kernels::harmonics::is_tone;
-use afmid_kernels::spectra::{excited_share, is_impulsive, period_samples, rings_on, shows_resonance};
+use afmid_kernels::spectra::{
+    energy_beside_hits, excited_share, is_impulsive, period_samples, resonance_segment, rings_on,
+};
 use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
@@ -9,7 +11,7 @@ use super::density::density;
 use super::first_file::FirstFile;
 use super::hit_names::are_hits;
 use super::lever::{force_curve, is_of_a_lever};
-use super::pipeline::{Wanted, segment_samples};
+use super::pipeline::Wanted;
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
 use super::stated::{does_without_unit, of_rate};
@@ -37,6 +39,8 @@ pub struct Choice<'a> {
     pub struck: bool,
     /// Samples with which the input repeats itself.
     pub period_samples: Option<usize>,
+    /// Samples of the segments of an averaged spectrum that resolve its resonance.
+    pub segment_samples: Option<usize>,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Why, for a comment in the config; empty where the user chose.
@@ -56,6 +60,7 @@ impl<'a> Choice<'a> {
             frequencies: None,
             struck: false,
             period_samples: None,
+            segment_samples: None,
             records_are: None,
             why,
             notes: Vec::new(),
@@ -99,7 +104,7 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
             Some(question) => Err(question),
             None => input_output(file, wanted, Some(goal)),
         },
-        Some(goal) => one_channel(source, wanted, goal, String::new()),
+        Some(goal) => Ok(thermal(file, one_channel(source, wanted, goal, String::new())?)),
     }
 }
 
@@ -152,8 +157,8 @@ fn input_output<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, goal: Option<Goal
     let outputs = if wanted.channels.is_empty() { like(&found, best.unwrap_or(found[0]), file) } else { found };
     if goal.is_none()
         && struck
-        && records_are.is_none()
-        && let Some(choice) = rings_into_the_next(file, wanted, inputs[0], &outputs)?
+        && wanted.records_are.is_none()
+        && let Some(choice) = decays_instead(file, wanted, inputs[0], &outputs)?
     {
         return Ok(choice);
     }
@@ -202,8 +207,13 @@ fn excites_a_part(file: &FirstFile<'_>, input: &Channel, period: usize) -> bool 
     file.samples(input).is_ok_and(|values| excited_share(&values[..period.min(values.len())]) < PART_OF_BAND)
 }
 
-/// Free decays where a structure still rings when a hit's block ends: responses by blocks would be of more than the block.
-fn rings_into_the_next<'a>(
+/// Energy of a force beside its hits, over that of its hits, from which on responses have dampings that are wrong by more
+/// than their errors.
+const MOST_BESIDE_HITS: f64 = 0.05;
+
+/// Free decays where responses by blocks would be wrong: a structure still rings when a hit's block ends, or the force has
+/// much noise or drift beside its hits.
+fn decays_instead<'a>(
     file: &FirstFile<'a>,
     wanted: &Wanted<'_>,
     force: &'a Channel,
@@ -214,7 +224,15 @@ fn rings_into_the_next<'a>(
     if file.hitting(outputs, wanted).is_none() {
         return Ok(None);
     }
-    let Some(share) = rings_on(&file.samples(force)?, &rows) else { return Ok(None) };
+    let measured = file.samples(force)?;
+    let beside = energy_beside_hits(&measured);
+    let reason = match rings_on(&measured, &rows) {
+        Some(share) => format!("{:.0} % of the amplitude is left where the next hit or the end comes", 100.0 * share),
+        None if beside > MOST_BESIDE_HITS => {
+            format!("noise and drift of {} have {} times the energy of its hits", force.location, number(beside))
+        }
+        None => return Ok(None),
+    };
     let (_, found) = file.search(outputs, Some(force), wanted)?;
     if found.decays.is_empty() {
         return Ok(None);
@@ -225,12 +243,10 @@ fn rings_into_the_next<'a>(
     };
     let names: Vec<&str> = outputs.iter().map(|channel| channel.location.as_str()).collect();
     let why = format!(
-        "{} of {} in {}: {:.0} % of the amplitude is left where the next hit or the end comes, which frequency responses \
-         by blocks do not bear; --goal frf makes them all the same, --goal input-output fits {} to one of them",
-        decays,
+        "{decays} of {} in {}: {reason}, which frequency responses by blocks do not bear; --goal frf makes them all the \
+         same, --goal input-output fits {} to one of them",
         names.join(", "),
         file.source.name(),
-        100.0 * share,
         force.location
     );
     Ok(Some(Choice { force: Some(force), ..Choice::of(Goal::Decay, outputs.to_vec(), why) }))
@@ -250,7 +266,14 @@ fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: Str
 
 /// Whether noise in any of the signals has a resonance in it.
 fn resonates(signals: &[Vec<f64>]) -> bool {
-    signals.iter().any(|values| shows_resonance(values, segment_samples(values.len())))
+    signals.iter().any(|values| resonance_segment(values).is_some())
+}
+
+/// The resonance in a channel's noise.
+fn thermal<'a>(file: &FirstFile<'a>, choice: Choice<'a>) -> Choice<'a> {
+    let channel = choice.channels.first().filter(|_| choice.goal == Goal::Thermal);
+    let segment_samples = channel.and_then(|channel| resonance_segment(&file.samples(channel).ok()?));
+    Choice { segment_samples, ..choice }
 }
 
 /// That several sensors move at random with no measured force.
@@ -276,7 +299,7 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         return Err(("--as points: decays without a measured force have no common scale".to_owned(), Some(help)));
     }
     let source = file.source;
-    let Sensors { channels, left_out } = match wanted.channels {
+    let Sensors { channels, left_out: said } = match wanted.channels {
         [] => sensors(file)?,
         names => {
             let channels = names.iter().map(|name| named(source, name)).collect::<Result<Vec<_>, _>>()?;
@@ -284,12 +307,18 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
         }
     };
     let steps = steps::hint(file, &channels, wanted);
-    let notes: Vec<String> = left_out.into_iter().chain(steps.clone()).collect();
     let cells = channels.len() > 1 && channels.iter().all(|channel| channel.location.ends_with('}'));
     let records_are = wanted.records_are.or(cells.then_some(RecordsAre::Hits));
     // cells are hits of their own: one is enough to see what they are
     let seen = if records_are == Some(RecordsAre::Hits) { &channels[..1] } else { &channels[..] };
     let force = file.hitting(seen, wanted).filter(|_| !guessed && records_are.is_none());
+    let said = match force {
+        Some(force) if said.is_some() => {
+            left_out(source, &channels.iter().copied().chain([force]).collect::<Vec<&Channel>>())
+        }
+        _ => said,
+    };
+    let notes: Vec<String> = said.into_iter().chain(steps.clone()).collect();
     let (values, found) = file.search(seen, force, wanted)?;
     let record = source.name();
     let other = |goal, why| Ok(Choice { notes: notes.clone(), ..Choice::of(goal, vec![channels[0]], why) });
@@ -316,7 +345,7 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
                 return Err(several_in_noise(source, &channels));
             }
             let reason = if found.random { reason } else { "noise with a resonance in it".to_owned() };
-            return other(Goal::Thermal, format!("{record}: {reason}"));
+            return Ok(thermal(file, other(Goal::Thermal, format!("{record}: {reason}"))?));
         }
         (None, Some(reason)) if guessed => {
             let none = format!("{reason}; no steady oscillation and no resonance in noise either");

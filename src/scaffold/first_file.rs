@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, DecayTrigger, find_decays};
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
-use afmid_kernels::statistics::median_and_scale;
 use afmid_pipeline::recording::{
     Contents, FoundChannel, FoundResponse, Measurement, Reading, UnpackedContents, contradiction, gains_without_phase,
     mean_rate, open_unpacked, responses, says_frequencies,
@@ -180,13 +179,12 @@ impl<'a> FirstFile<'a> {
         Ok((values, found.map_err(|error| self.plain(&error.to_string()))?))
     }
 
-    /// The measured force of hits that the channels answer; none where there is none or another length, or where weak hits
-    /// are among them that begin no decay of their own.
+    /// The measured force of hits that the channels answer; none where there is none or another length.
     pub fn hitting(&self, channels: &[&Channel], wanted: &Wanted<'_>) -> Option<&'a Channel> {
         let inputs = inputs(self.source, wanted).ok()?;
         let [force] = inputs[..] else { return None };
         let beside = channels.iter().all(|one| one.samples == force.samples && one.location != force.location);
-        let hits = |values: Vec<f64>| is_impulsive(&values) && !has_weak_hits(&values);
+        let hits = |values: Vec<f64>| is_impulsive(&values);
         (beside && self.samples(force).is_ok_and(hits)).then_some(force)
     }
 
@@ -212,29 +210,6 @@ impl<'a> FirstFile<'a> {
     }
 }
 
-/// Share of the largest force from which a pulse begins a decay.
-const HIT: f64 = 0.1;
-/// Share of the largest force from which a pulse excites what is seen, and standard deviations of the force's noise.
-const WEAK_HIT: (f64, f64) = (0.02, 8.0);
-/// Share of a record within which weak pulses beside a hit belong to it: its bounce, a filter's answer.
-const OF_ONE_HIT: f64 = 0.02;
-
-/// Whether a force has pulses too weak to begin a decay and too strong to be none.
-fn has_weak_hits(force: &[f64]) -> bool {
-    let (rest, noise) = median_and_scale(&mut force.to_vec());
-    let size = |value: &f64| (value - rest).abs();
-    let largest = force.iter().map(size).fold(0.0, f64::max);
-    let weakest = (WEAK_HIT.0 * largest).max(WEAK_HIT.1 * noise);
-    let hits: Vec<usize> = (0..force.len()).filter(|&k| size(&force[k]) > HIT * largest).collect();
-    let reach = ((OF_ONE_HIT * force.len() as f64) as usize).max(32);
-    let near = |k: usize| {
-        let next = hits.partition_point(|hit| *hit < k);
-        let beside = [next.checked_sub(1), Some(next)];
-        beside.into_iter().flatten().filter_map(|at| hits.get(at)).any(|hit| hit.abs_diff(k) <= reach)
-    };
-    (0..force.len()).any(|k| size(&force[k]) > weakest && !near(k))
-}
-
 /// Whether a file holds frequency responses; `guessed`: even if nothing in it says so.
 pub fn holds_responses(contents: &Contents, guessed: bool) -> bool {
     let found = responses(contents, None).unwrap_or_default();
@@ -242,18 +217,4 @@ pub fn holds_responses(contents: &Contents, guessed: bool) -> bool {
     !found.is_empty()
         && found.iter().all(has_frequencies)
         && (guessed || found.iter().all(|response| !response.guessed))
-}
-
-#[cfg(test)]
-#[test]
-fn a_weak_hit_is_seen_where_it_is_no_bounce() {
-    let with = |pulses: &[(usize, f64)]| {
-        let mut force: Vec<f64> = (0..4000).map(|k| 0.05 * f64::from(k * k % 17 - 8) / 8.0).collect();
-        for &(at, size) in pulses {
-            (0..4).for_each(|k| force[at + k] += size * [0.4, 1.0, 0.7, 0.2][k]);
-        }
-        has_weak_hits(&force)
-    };
-    assert!(!with(&[(500, 100.0), (2000, 30.0)]) && !with(&[(500, 100.0), (540, 6.0)]));
-    assert!(with(&[(500, 100.0), (2000, 8.0)]) && with(&[(500, -100.0), (3000, -4.0)]));
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use afmid_kernels::spectra::segment_samples;
 use afmid_pipeline::toml::{Table, Value};
 use afmid_stages::io::quantity_of_unit;
 
@@ -145,7 +146,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 text.push_str(&format!("params = {{ blocks = \"{blocks}\"{before}{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
-                let samples = segment_samples(choice.channels[0].samples);
+                let samples = choice.segment_samples.unwrap_or_else(|| segment_samples(choice.channels[0].samples));
                 text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"all\" }}\n"));
             }
             _ => {
@@ -190,11 +191,6 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
         params.insert("unit".to_owned(), text(unit));
     }
     Ok(format!("params = {}\n", Value::Table(params)))
-}
-
-/// Samples of a segment of a spectrum: a power of two, at least 30 of them in a record, half overlapping.
-pub fn segment_samples(samples: usize) -> usize {
-    (samples / 16).max(64).next_power_of_two().min(1 << 22) / 2
 }
 
 /// The `params` of the stage `frf`.

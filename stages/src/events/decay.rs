@@ -22,8 +22,9 @@ use afmid_kernels::harmonics::find_decays_beside_lines;
 /// Model: quiet, an event, free ringing of any number of modes that dies away in noise; the same again. What does not
 /// die away is a steady oscillation, which has no quality factor to be had.
 /// Method: the energy of all channels over a period against the noise's; starts refined to the first departure from the
-/// quiet line before; the end is where the ringing is smaller than the noise, or the next start; the first free sample is
-/// the one from which later samples foretell the earlier ones backwards. Clipped samples are missing. Where a steady line
+/// quiet line before, hits into ringing by where its prediction fails; the end is where the ringing is smaller than the
+/// noise, or half a period before the next start; the first free sample is the one from which later samples foretell the
+/// earlier ones backwards. Clipped samples are missing. Where a steady line
 /// hides all decays (hum), they are sought in what is left without it and its harmonics; the line stays in the decays, as
 /// one of the lines that `model.decay` fits beside the modes. A hit with the samples of an earlier one, and a sensor
 /// with those of another in every record, count once (more than 100 samples, not all of one value); a warning names
@@ -78,7 +79,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 9,
+        version: 10,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],

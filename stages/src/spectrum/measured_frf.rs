@@ -50,8 +50,8 @@ pub struct MeasuredFrf {
     /// a record from columns is most often of the first kind.
     pub blocks: BlocksAre,
     /// Samples of a block. Absent: an eighth of the record for segments (15 of them: a coherence good to a tenth), the
-    /// period that the inputs show, as many as hits are apart at least, the whole record for a single hit, to the end of the shortest for a record each. With
-    /// `before`, as many as its blocks have.
+    /// period that the inputs show, as many as hits are apart at least, the whole record for a single hit, to the end of the
+    /// shortest for a record each. With `before`, as many as its blocks have.
     #[schemars(range(min = 8))]
     pub block_samples: Option<usize>,
     /// Samples of a hit before the force comes to a tenth of its largest value. Why: a pulse has risen from nothing

@@ -75,15 +75,15 @@ pub use local_polynomial::{PolynomialSettings, local_polynomial};
 pub use local_rational::{RationalSettings, local_rational};
 pub use measured_input::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, chance_coherence, common_hit_samples,
-    excited_share, frequency_response, half_energy_samples, hit_begins, hit_spacing, hits, is_impulsive,
-    period_samples, periods, rings_on, segments, with_hits,
+    energy_beside_hits, excited_share, frequency_response, half_energy_samples, hit_begins, hit_spacing, hits,
+    is_impulsive, period_samples, periods, rings_on, segments, with_hits,
 };
 pub use neighbour_scatter::neighbour_scatter;
 pub use neighbours::{Bins, Smoothed, SuppressedLine};
 pub use power::{PowerSpectrum, power_spectrum};
 pub use presence::Presence;
 pub use ratio::{EndTreatment, EtfeSettings, TransferEstimate, difference, etfe};
-pub use resonance::{FALSE_ALARM as RESONANCE_FALSE_ALARM, resonance_chance, shows_resonance};
+pub use resonance::{FALSE_ALARM as RESONANCE_FALSE_ALARM, resonance_chance, resonance_segment, segment_samples};
 pub use seen_oscillator::SeenThrough;
 pub use thermal_fit::{AveragedDensity, Fitted, FoundLine, ThermalFit, ThermalFitSettings, thermal_fit};
 pub use thermal_peak::{PeakSearch, thermal_peak};

@@ -17,43 +17,69 @@ const LINE_BINS: f64 = 3.5;
 /// Bins at either end that are left out: the removed mean, the fold.
 const EDGE: usize = 4;
 
-/// Whether the spectrum of a record, averaged over half-overlapping segments, is that of an oscillator driven by noise.
+/// Bins that a resonance is wide at least where shorter segments lose none of it. Why: in wider bins a part of a narrow peak
+/// passes for a line.
+const RESOLVED_BINS: f64 = 8.0;
+/// Bins that it is wide at least: a line has the window's width and none of its own.
+const LEAST_BINS: f64 = 0.5;
+/// Longest segments in a record: seven of them, half overlapping, still tell noise from a line.
+const LEAST_SEGMENTS: usize = 4;
+
+/// Samples of a segment of an averaged spectrum, of a resonance that is not looked for: a power of two, at least 30 of them
+/// in a record, half overlapping.
+pub fn segment_samples(samples: usize) -> usize {
+    (samples / 16).max(64).next_power_of_two().min(1 << 22) / 2
+}
+
+/// Samples of the segments over which the spectrum of a record is averaged to show an oscillator driven by noise; none
+/// where it shows none.
 ///
 /// # Model
 /// That of [`thermal_fit`].
 /// # Method
 /// Twice the gain in log-likelihood that the resonance brings over white and 1/f noise alone, less what the window's
 /// correlation of neighbours adds, as a chi-square of three degrees in as many places as there are bins. The peak stands
-/// above the floor.
+/// above the floor and is half a bin wide at least. A quarter of the record first, then shorter segments down to
+/// [`segment_samples`] until one shows it; of those in which it is eight bins wide the shortest.
 /// # Shapes
-/// `values`: N samples, equally spaced; `segment`: samples of a segment, even.
+/// `values`: N samples, equally spaced.
 /// # Units
 /// None matter.
 /// # Accuracy
-/// In none of 300 records of white noise and none of 300 of 1/f noise, in all of 100 with resonances of Q 3 to 100 and as
-/// much noise (test; a third of the seeds in every run). A resonance much narrower than a bin is a line to it.
+/// In none of 300 records of white noise and none of 300 of 1/f noise, in all of 100 with resonances of Q 3 to 300 and as
+/// much noise (test; a third of the seeds in every run).
 /// # Errors
 /// What cannot be fitted has no resonance.
 /// # Source
 /// As [`thermal_fit`].
-pub fn shows_resonance(values: &[f64], segment: usize) -> bool {
-    let averaged = Welch::new(segment, 1.0, Detrend::Mean).and_then(|mut welch| {
-        welch.push(values);
-        welch.average()
-    });
-    let Ok(averaged) = averaged else { return false };
+pub fn resonance_segment(values: &[f64]) -> Option<usize> {
+    let shortest = segment_samples(values.len());
+    let longer = |length: &usize| Some(2 * length).filter(|length| LEAST_SEGMENTS * length <= values.len());
+    let mut lengths: Vec<usize> = std::iter::successors(Some(shortest), longer).collect();
+    lengths.reverse();
+    let false_alarm = FALSE_ALARM / lengths.len() as f64;
+    let width = |length: usize| width_bins(values, length, false_alarm).filter(|bins| *bins >= LEAST_BINS);
+    let (longest, bins) = lengths.iter().find_map(|&length| Some((length, width(length)?)))?;
+    let resolved = |length: &&usize| bins * **length as f64 >= RESOLVED_BINS * longest as f64;
+    let shorter = lengths.iter().filter(|length| **length < longest).rfind(resolved);
+    Some(shorter.copied().filter(|length| width(*length).is_some()).unwrap_or(longest))
+}
+
+/// Width of the resonance in bins of the spectrum averaged over segments; none where chance makes as much.
+fn width_bins(values: &[f64], segment: usize, false_alarm: f64) -> Option<f64> {
+    let mut welch = Welch::new(segment, 1.0, Detrend::Mean).ok()?;
+    welch.push(values);
+    let averaged = welch.average().ok()?;
     let frequency_hz = averaged.frequency_hz();
     let inner = EDGE..averaged.density.len().saturating_sub(EDGE);
-    let (Some(frequency_hz), Some(density)) = (frequency_hz.get(inner.clone()), averaged.density.get(inner)) else {
-        return false;
-    };
+    let (frequency_hz, density) = (frequency_hz.get(inner.clone())?, averaged.density.get(inner)?);
     let averages = averaged.independent_segments();
     let density = AveragedDensity { frequency_hz, density, averages, through: Some(SeenThrough::Hann) };
-    thermal_fit(density, ThermalFitSettings::default()).is_ok_and(|fit| {
-        let (frequency, quality) = (fit.frequency_hz.value, fit.quality_factor.value);
-        let peak = std::f64::consts::FRAC_2_PI * fit.variance.value * quality / frequency;
-        quality > LEAST_QUALITY && peak > fit.white.value && resonance_chance(&density, &fit) < FALSE_ALARM
-    })
+    let fit = thermal_fit(density, ThermalFitSettings::default()).ok()?;
+    let (frequency, quality) = (fit.frequency_hz.value, fit.quality_factor.value);
+    let peak = std::f64::consts::FRAC_2_PI * fit.variance.value * quality / frequency;
+    let shows = quality > LEAST_QUALITY && peak > fit.white.value && resonance_chance(&density, &fit) < false_alarm;
+    shows.then_some(frequency / quality * segment as f64)
 }
 
 /// Chance that a spectrum of noise without a resonance gains as much from one at any of its frequencies, at most 1.
@@ -152,12 +178,15 @@ mod tests {
     fn noise_shows_none_and_an_oscillator_does() {
         let (mut white, mut coloured, mut missed) = (0, 0, 0);
         for seed in 0..SEEDS {
-            let (samples, segment) = if seed % 2 == 0 { (4096, 128) } else { (20_000, 1024) };
-            white += usize::from(shows_resonance(&white_noise(samples, 1.0, 77_000 + seed), segment));
-            coloured += usize::from(shows_resonance(&flicker(88_000 + 10 * seed, samples), segment));
+            let samples = if seed % 2 == 0 { 4096 } else { 20_000 };
+            white += usize::from(resonance_segment(&white_noise(samples, 1.0, 77_000 + seed)).is_some());
+            coloured += usize::from(resonance_segment(&flicker(88_000 + 10 * seed, samples)).is_some());
             if seed < SEEDS / 3 {
-                let quality = [3.0, 10.0, 30.0, 100.0][seed as usize % 4];
-                missed += usize::from(!shows_resonance(&resonance(seed, quality, 13.7, 20_000), 1024));
+                let quality = [3.0, 10.0, 30.0, 100.0, 300.0][seed as usize % 5];
+                let found = resonance_segment(&resonance(seed, quality, 13.7, 20_000));
+                // 13.7 samples times the quality factor are the samples of a bin as wide as the resonance
+                let resolved = found.is_some_and(|length| length as f64 >= 2.0 * 13.7 * quality || length >= 4096);
+                missed += usize::from(!resolved);
             }
         }
         // a thousandth each: two of 100 once in 200 times

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::envelope::Envelope;
-use crate::statistics::median;
+use crate::signal::without_slow;
+use crate::statistics::{median, median_and_scale};
 
 /// Share of the largest energy from which on a stretch is driven.
 const DRIVEN: f64 = 0.5;
@@ -12,13 +13,45 @@ const LEAST_PERIODS: usize = 8;
 /// Share of the plateau's energy down to which its last samples still belong to it.
 const PLATEAU: f64 = 0.8;
 
-/// Stretches of a drive or of a force: from the first to the last sample beyond a tenth of its largest swing before it rests
-/// for two periods.
-pub(super) fn driven_stretches(drive: &[f64], period: usize) -> Vec<Range<usize>> {
+/// Share of the largest swing beyond which a drive acts.
+const ACTS: f64 = 0.1;
+/// The same of a weak hit, and standard deviations of the force's noise.
+const WEAK: (f64, f64) = (0.01, 8.0);
+
+/// Stretches of a drive: from the first to the last sample beyond a tenth of its largest swing before it rests for two
+/// periods.
+fn driven_stretches(drive: &[f64], period: usize) -> Vec<Range<usize>> {
     let rest = median(&mut drive[drive.len() - drive.len() / 16 - 1..].to_vec());
-    let largest = drive.iter().fold(0.0_f64, |m, y| m.max((y - rest).abs()));
+    let swings: Vec<f64> = drive.iter().map(|y| y - rest).collect();
+    let largest = swings.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+    beyond(&swings, ACTS * largest, period)
+}
+
+/// Hits of a force, ascending: pulses beyond a tenth of the largest one; weaker ones, beyond its noise, that the response
+/// rises at.
+///
+/// `rises`: samples at which the response rises. What wanders slower than a pulse is no force.
+pub(super) fn hits_of_force(force: &[f64], rises: &[usize], period: usize) -> Vec<Range<usize>> {
+    let swings = without_slow(force);
+    let largest = swings.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+    let (_, noise) = median_and_scale(&mut swings.clone());
+    let certain = WEAK.1 * noise;
+    let mut hits = beyond(&swings, (ACTS * largest).max(certain), period);
+    let far = |hit: &Range<usize>, strong: &Range<usize>| {
+        hit.start > strong.end + 2 * period || strong.start > hit.end + 2 * period
+    };
+    let answered = |hit: &Range<usize>| rises.iter().any(|rise| rise.abs_diff(hit.start) <= period);
+    let mut weak = beyond(&swings, (WEAK.0 * largest).max(certain), period);
+    weak.retain(|hit| answered(hit) && hits.iter().all(|strong| far(hit, strong)));
+    hits.extend(weak);
+    hits.sort_by_key(|hit| hit.start);
+    hits
+}
+
+/// From the first to the last sample beyond a level before two periods of rest.
+fn beyond(swings: &[f64], level: f64, period: usize) -> Vec<Range<usize>> {
     let mut stretches: Vec<Range<usize>> = Vec::new();
-    for k in (0..drive.len()).filter(|&k| (drive[k] - rest).abs() > 0.1 * largest) {
+    for k in (0..swings.len()).filter(|&k| swings[k].abs() > level) {
         match stretches.last_mut() {
             Some(last) if k < last.end + 2 * period => last.end = k + 1,
             _ => stretches.push(k..k + 1),

@@ -28,6 +28,7 @@
 //! # Ok::<(), afmid_kernels::events::decay::DecaySearchError>(())
 //! ```
 
+mod afterwards;
 mod backward;
 mod beat;
 #[cfg(test)]
@@ -51,6 +52,9 @@ mod search_tests;
 #[cfg(test)]
 mod simulated;
 mod steadiness;
+mod struck;
+#[cfg(test)]
+mod struck_tests;
 #[cfg(test)]
 mod tests;
 

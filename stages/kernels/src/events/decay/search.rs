@@ -2,22 +2,24 @@
 
 use std::ops::Range;
 
+use super::afterwards::is_another;
 use super::clipping::{clipped, touches};
-use super::drive::{bend, driven_stretches, ends_of_drive, ends_of_response};
+use super::drive::{bend, ends_of_drive, ends_of_response, hits_of_force};
 use super::envelope::{Envelope, Pitch, without_drift};
 use super::error::DecaySearchError;
 use super::extent::{Begin, begin, beyond, departure, end, quiet_before};
 use super::found::{ChannelDecay, DecayEnd, DecaySearch, Decline, DismissedDecay, DismissedReason, FreeDecay, Steady};
 use super::noise_floor::noise_std;
-use super::onsets::{QUIET, QUIET_PERIODS, onsets};
+use super::onsets::{QUIET, QUIET_PERIODS, onsets, rises};
 use super::options::{DecaySearchOptions, DecayTrigger};
-use super::steadiness::oscillation;
+use super::steadiness::{SEGMENT_PERIODS, oscillation};
+use super::struck::{Failures, hits_into_ringing};
 use crate::events::baseline;
 use crate::signal::code_step;
 
-/// Share of a period before the next hit of a force that is left out. Why: a converter's filter of linear phase answers
-/// some samples before it.
-const BEFORE_HIT: f64 = 0.5;
+/// Share of a period before the next event that is left out. Why: a hit is seen a sample or two after its contact begins,
+/// and a converter's filter of linear phase answers some samples before it.
+const BEFORE_EVENT: f64 = 0.5;
 /// Least samples of a record.
 const LEAST_SAMPLES: usize = 64;
 /// Periods of a decay at least.
@@ -40,7 +42,8 @@ const LEAST_FALL: f64 = 1e-3;
 /// # Method
 /// 1. The strongest oscillation sets the period. Each channel less its running mean over two periods, over its noise
 ///    (quietest stretches), squared and added: the envelope.
-/// 2. Starts by [`DecayTrigger`]; of rises refined to the first sustained departure from the quiet line before.
+/// 2. Starts by [`DecayTrigger`]; of rises refined to the first sustained departure from the quiet line before. Hits into
+///    ringing: where its prediction fails and what rings afterwards is not what rang before.
 /// 3. End: where the ringing of two periods is smaller than the noise, or the next start.
 /// 4. First free sample: the later samples foretell it backwards by a linear recurrence; contact and saturation do not
 ///    obey it.
@@ -102,6 +105,8 @@ pub(super) struct Record<'a> {
     pub(super) swings: Vec<Vec<f64>>,
     /// Infinite for a channel that never changes: it takes no part.
     pub(super) noise_std: Vec<f64>,
+    /// Steps of the codes; 0 where there are none.
+    steps: Vec<f64>,
     clipped: Vec<Vec<Range<usize>>>,
     pub(super) envelope: Envelope,
     /// Where a steady response begins to die.
@@ -134,7 +139,9 @@ impl<'a> Record<'a> {
         let clipped = channels.iter().zip(&steps).map(|(y, &step)| clipped(y, step)).collect();
         let drive = drive.map(|c| all[c]);
         let hits = match options.trigger {
-            DecayTrigger::Force { .. } => drive.map_or_else(Vec::new, |force| driven_stretches(force, period)),
+            DecayTrigger::Force { .. } => {
+                drive.map_or_else(Vec::new, |force| hits_of_force(force, &rises(&envelope, options), period))
+            }
             _ => Vec::new(),
         };
         Self {
@@ -143,6 +150,7 @@ impl<'a> Record<'a> {
             drive,
             swings,
             noise_std,
+            steps,
             clipped,
             response_ends: ends_of_response(&envelope),
             hits,
@@ -165,7 +173,7 @@ impl<'a> Record<'a> {
             (DecayTrigger::DriveEnd { .. }, None) => self.response_ends.clone(),
             (DecayTrigger::Force { .. }, Some(_)) => self.hits.iter().map(|hit| hit.start).collect(),
             (DecayTrigger::LargestRise, _) => {
-                self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options))
+                self.with_hits(self.without_beats(onsets(&self.all, &self.envelope, self.rate_hz, options)))
             }
             _ => onsets(&self.all, &self.envelope, self.rate_hz, options),
         }
@@ -182,7 +190,10 @@ impl<'a> Record<'a> {
             let quiet = start < QUIET_PERIODS * period
                 || self.envelope.mean(before - before.min(QUIET_PERIODS * period), before) < QUIET;
             let (end, _) = end(&self.envelope, start, next);
-            if !quiet && (self.begin(start, end).foretold || self.is_late_beat(&starts[..=place])) {
+            // a beat may dip below the noise: it rises no higher than its decay began
+            let lower = place > 0 && self.height(start) < self.height(starts[place - 1]);
+            let foretold = (!quiet || lower) && self.begin(start, end).foretold;
+            if foretold || (!quiet && self.is_late_beat(&starts[..=place])) {
                 starts.remove(place);
             } else {
                 next = start;
@@ -191,13 +202,47 @@ impl<'a> Record<'a> {
         starts
     }
 
+    /// Adds hits into the ringing of earlier ones, places those among the rises that are such, and leaves out glitches.
+    fn with_hits(&self, starts: Vec<usize>) -> Vec<usize> {
+        let apart = LEAST_PERIODS * self.envelope.period;
+        let mut all = Vec::with_capacity(starts.len());
+        let mut since = 0;
+        while let Some(&start) = starts.get(since) {
+            // through all rises that come before it has died
+            let mut last = since;
+            let until = loop {
+                let next = starts.get(last + 1).copied();
+                match end(&self.envelope, starts[last], next.unwrap_or(self.envelope.samples())) {
+                    (_, DecayEnd::NextEvent) if next.is_some() => last += 1,
+                    (end, _) => break end,
+                }
+            };
+            let ringing = (start + apart).min(until)..until;
+            let Failures { mut hits, glitches } =
+                hits_into_ringing(&self.channels, &self.steps, &self.clipped, &ringing, self.envelope.period);
+            hits.retain(|&hit| hit + apart < until && is_another(&self.channels, hit, self.frequency));
+            let rises = &starts[since + 1..=last];
+            let far = |from: &[usize], rise: usize| from.iter().all(|one| one.abs_diff(rise) > apart);
+            let placed = |rise: &&usize| far(&hits, **rise) && far(&glitches, **rise);
+            all.push(start);
+            all.extend(rises.iter().filter(placed));
+            all.extend(hits);
+            since = last + 1;
+        }
+        all.sort_unstable();
+        all
+    }
+
     /// Whether the last of the starts is too late in the record for what follows to foretell anything, and no higher
     /// than the one before it: a beat rises no higher than its decay began.
     fn is_late_beat(&self, starts: &[usize]) -> bool {
         let [.., before, last] = *starts else { return false };
-        let span = LEAST_PERIODS * self.envelope.period;
-        let height = |start: usize| self.envelope.largest(start, start + span);
-        last + span > self.envelope.samples() && height(last) < height(before)
+        last + LEAST_PERIODS * self.envelope.period > self.envelope.samples() && self.height(last) < self.height(before)
+    }
+
+    /// Largest energy within the first periods.
+    fn height(&self, start: usize) -> f64 {
+        self.envelope.largest(start, start + LEAST_PERIODS * self.envelope.period)
     }
 
     fn begin(&self, onset: usize, end: usize) -> Begin {
@@ -222,12 +267,9 @@ impl<'a> Record<'a> {
         };
         let (end, why) = end(&self.envelope, onset, next);
         let hit = self.hits.iter().find(|hit| hit.contains(&onset));
-        let end = match (hit, why) {
-            (Some(_), DecayEnd::NextEvent) => {
-                end.saturating_sub((BEFORE_HIT * period as f64).ceil() as usize).max(onset)
-            }
-            _ => end,
-        };
+        let before = (BEFORE_EVENT * period as f64).ceil() as usize;
+        let left_out = why == DecayEnd::NextEvent && (hit.is_some() || !given);
+        let end = if left_out { end.saturating_sub(before).max(onset) } else { end };
         let driven = if given { None } else { self.driven_until(onset, end, options, found) };
         let onset = driven.unwrap_or(onset);
         let first = match options.trigger {
@@ -242,7 +284,13 @@ impl<'a> Record<'a> {
             return end;
         }
         let range = first..end;
-        let mut tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+        let seen =
+            |periods: f64| oscillation(&self.channels, &self.noise_std, &range, self.frequency, periods, self.rate_hz);
+        let mut tone = seen(SEGMENT_PERIODS);
+        if !tone.decline.std_per_s.is_finite() && why != DecayEnd::Noise {
+            // up to the next hit few periods are all there is
+            tone.decline = seen(LEAST_PERIODS as f64).decline;
+        }
         // what does not turn twice is a relaxation
         if tone.frequency * (range.len() as f64) < LEAST_PERIODS as f64 {
             found.dismissed.push(DismissedDecay { onset, reason: DismissedReason::TooShort });
@@ -280,9 +328,10 @@ impl<'a> Record<'a> {
         let seen = self.response_ends.iter().copied().find(inside);
         let bends = bend(&self.envelope, onset..end).filter(inside);
         let steady = |last: usize| {
-            // the switch-on is not steady, nor are the last periods where the end is late
-            let range = onset + period..last - period.max((last - onset) / END);
-            let tone = oscillation(&self.channels, &self.noise_std, &range, self.frequency, self.rate_hz);
+            // the drive's first half may build up, and the last periods are none of it where the end is late
+            let range = onset + period.max((last - onset) / 2)..last - period.max((last - onset) / END);
+            let tone =
+                oscillation(&self.channels, &self.noise_std, &range, self.frequency, SEGMENT_PERIODS, self.rate_hz);
             let duration_s = range.len() as f64 / self.rate_hz;
             let falls = tone.decline.rate_per_s.abs() * duration_s;
             let known = tone.decline.std_per_s * duration_s < DRIVEN_FALL;

@@ -12,7 +12,7 @@ use crate::signal::{RealTransform, hann};
 /// Segments of a stretch at most.
 const SEGMENTS: usize = 32;
 /// Least periods of a segment: its taper keeps other modes off.
-const PERIODS: f64 = 4.0;
+pub(super) const SEGMENT_PERIODS: f64 = 4.0;
 /// Least segments for a slope with an error.
 const LEAST_SEGMENTS: usize = 6;
 
@@ -35,7 +35,7 @@ impl Oscillation {
     }
 }
 
-/// Amplitude and decline of the oscillation at about `frequency` (cycles per sample).
+/// Amplitude and decline of the oscillation at about `frequency` (cycles per sample), by segments of `periods` at least.
 ///
 /// # Method
 /// The stretch in up to 32 segments; in each the Hann-weighted amplitude at the frequency, all channels weighted by
@@ -47,9 +47,10 @@ pub(super) fn oscillation(
     noise_std: &[f64],
     range: &Range<usize>,
     frequency: f64,
+    periods: f64,
     rate_hz: f64,
 ) -> Oscillation {
-    let length = ((range.len() / SEGMENTS).max((PERIODS / frequency.max(1e-12)).ceil() as usize)).clamp(1, range.len());
+    let length = ((range.len() / SEGMENTS).max((periods / frequency.max(1e-12)).ceil() as usize)).clamp(1, range.len());
     let count = range.len() / length;
     let taper = hann(length, 0.5);
     let strongest = strongest(channels, noise_std, range);

@@ -1,9 +1,9 @@
 //! Blocks of measured input and output, and what is done to them before the transform.
 
-use crate::signal::hann;
+use crate::signal::{hann, without_slow};
 use crate::spectra::SpectrumError;
 use crate::spectra::error::finite;
-use crate::statistics::median;
+use crate::statistics::{median, median_and_scale};
 
 /// Inputs and outputs over the same samples.
 #[derive(Debug, Clone)]
@@ -157,9 +157,48 @@ pub fn hit_spacing(force: &[f64], before: usize) -> Option<usize> {
 /// Share of the samples in which a hammer's force has half of its energy, at most.
 const SHORT: f64 = 0.01;
 
-/// Whether an input is a hammer's: half of its energy about its median lies within a hundredth of its samples.
+/// Largest value over its noise that is a hammer's, whatever energy the noise has: no noise reaches it.
+const OUT_OF_NOISE: f64 = 12.0;
+
+/// Whether an input is a hammer's: half of its energy, less that of its noise, lies within a hundredth of its samples. What
+/// wanders slower is left out.
 pub fn is_impulsive(input: &[f64]) -> bool {
-    half_energy_samples(input) as f64 <= (SHORT * input.len() as f64).ceil()
+    let few = |samples: usize| samples as f64 <= (SHORT * input.len() as f64).ceil();
+    if few(half_energy_samples(input)) {
+        return true;
+    }
+    let mut swings = without_slow(input);
+    let (_, noise) = median_and_scale(&mut swings.clone());
+    let largest = swings.iter().map(|y| y.abs()).fold(0.0, f64::max);
+    if largest <= OUT_OF_NOISE * noise {
+        return false;
+    }
+    swings.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
+    let energies = || swings.iter().map(|y| y * y - noise * noise);
+    let half = 0.5 * energies().sum::<f64>();
+    let mut sum = 0.0;
+    let enough = |energy: f64| {
+        sum += energy;
+        sum > half
+    };
+    energies().position(enough).is_some_and(|last| few(last + 1))
+}
+
+/// Share of the largest value beyond which a force is a hit's, and samples to either side that are its own: a filter's
+/// answer.
+const OF_A_HIT: (f64, usize) = (0.1, 8);
+
+/// Energy of a force beside its hits, about its median, over that of its hits: noise and drift, which blocks divide by.
+pub fn energy_beside_hits(force: &[f64]) -> f64 {
+    let rest = median(&mut force.to_vec());
+    let size = |k: &usize| (force[*k] - rest).abs();
+    let largest = (0..force.len()).map(|k| size(&k)).fold(0.0, f64::max);
+    let mut hit = vec![false; force.len()];
+    for k in (0..force.len()).filter(|k| size(k) > OF_A_HIT.0 * largest) {
+        hit[k.saturating_sub(OF_A_HIT.1)..(k + OF_A_HIT.1 + 1).min(force.len())].fill(true);
+    }
+    let energy = |inside: bool| (0..force.len()).filter(|k| hit[*k] == inside).map(|k| size(&k).powi(2)).sum::<f64>();
+    energy(false) / energy(true).max(f64::MIN_POSITIVE)
 }
 
 /// How many of a signal's samples, the largest about its median, have half of its energy; all of a constant one.

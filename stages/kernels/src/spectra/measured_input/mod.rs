@@ -13,8 +13,8 @@ mod rings_on;
 mod tests;
 
 pub use blocks::{
-    Block, BlockKind, common_hit_samples, half_energy_samples, hit_begins, hit_spacing, hits, is_impulsive, segments,
-    with_hits,
+    Block, BlockKind, common_hit_samples, energy_beside_hits, half_energy_samples, hit_begins, hit_spacing, hits,
+    is_impulsive, segments, with_hits,
 };
 pub use estimate::{Estimator, MeasuredResponse, ResponseSettings, frequency_response};
 pub use follows::chance_coherence;

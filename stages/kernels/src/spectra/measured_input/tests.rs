@@ -303,3 +303,27 @@ fn blocks_of_records_with_a_hit_each_reach_to_the_end_of_the_shortest() {
     assert_eq!(common_hit_samples(&blocks, 10, 0.1), Some(200));
     assert_eq!(hit_begins(&forces[1], 0.1), 100);
 }
+
+#[test]
+fn a_force_of_hits_is_told_from_others_in_noise_and_drift() {
+    for seed in 0..10 {
+        let mut quiet = vec![0.0; 16_000];
+        for hit in [1000, 8600] {
+            (0..4).for_each(|k| quiet[hit + k] += 100.0 * [0.4, 1.0, 0.7, 0.2][k]);
+        }
+        let with = |noise: f64, drift: f64| -> Vec<f64> {
+            let noise = white_noise(quiet.len(), noise, seed);
+            quiet.iter().zip(noise).enumerate().map(|(k, (y, e))| y + e + drift * k as f64 / 16_000.0).collect()
+        };
+        let clean = with(0.05, 0.0);
+        assert!(is_impulsive(&clean) && energy_beside_hits(&clean) < 0.01, "{}", energy_beside_hits(&clean));
+        for dirty in [with(5.0, 0.0), with(0.05, 24.0)] {
+            assert!(is_impulsive(&dirty) && energy_beside_hits(&dirty) > 0.5, "{}", energy_beside_hits(&dirty));
+        }
+        assert!(!is_impulsive(&white_noise(16_000, 1.0, seed + 50)));
+        // a burst of noise over a tenth of the record
+        let mut burst = white_noise(16_000, 1e-3, seed + 60);
+        burst[4000..5600].iter_mut().zip(white_noise(1600, 1.0, seed + 70)).for_each(|(y, e)| *y += e);
+        assert!(!is_impulsive(&burst));
+    }
+}
