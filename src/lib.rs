@@ -31,7 +31,7 @@ use std::process::ExitCode;
 
 use afmid_pipeline::own_command::own_arguments;
 use afmid_pipeline::stage::DoubleName;
-use afmid_pipeline::{InputFiles, Registry};
+use afmid_pipeline::{InputFiles, Registry, RunResult};
 use clap::FromArgMatches;
 
 #[doc(hidden)]
@@ -77,6 +77,11 @@ pub fn exit_code(registry: &Registry) -> u8 {
 /// What `inspect --json` says of a file, as JSON text.
 pub fn inspect_json(path: &Path) -> String {
     inspect::inspected_json(&inspect::inspect(path, &InputFiles::new(), false)).to_string()
+}
+
+/// The page that `report` writes, of a run that is in no file. Errors: its template does not go through.
+pub fn page(run: &RunResult) -> Result<String, String> {
+    report::report(run, &|_| String::new()).map_err(|error| error.to_string())
 }
 
 /// How a program ends whose stages do not make a registry.

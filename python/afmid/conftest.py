@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 
 # without the native module the package reads results, and no more
-NATIVE = ("_program", "__main__", "artifacts", "decays", "diagnoses", "identification", "reading", "running")
+NATIVE = (
+    *("_program", "__main__", "artifacts", "decays", "densities", "diagnoses", "identification", "pairs", "rational", "reading"),
+    *("response_modes", "responses", "running", "smoothed", "thermal"),
+)
 collect_ignore_glob = (
     [*(f"src/afmid/{name}.py" for name in NATIVE), "src/afmid/__init__.py"]
     if importlib.util.find_spec("afmid._native") is None

@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Array, Channel, Recording, StageError};
+use num_complex::Complex64;
 
 pub use crate::artifacts::Sensor as Named;
-use crate::artifacts::decay_array;
-pub use crate::io::columns::pair_of_series as pair;
-use crate::io::{MemorySource, memory_record};
+use crate::artifacts::{bare_transfer, decay_array};
+pub use crate::io::columns::{Recorded, pair_of_series as pair};
+pub use crate::io::density_of_values as density;
+pub use crate::io::frf::{ResponseAtHand, frf_of_responses as frf};
+use crate::io::{MemorySource, ascending, memory_record};
 
 /// What `io.records` hands on: records of as many samples in each of these channels. Errors: a record with another
 /// number of channels than names.
@@ -42,6 +45,18 @@ pub fn recording(
 pub fn decays(hits: &[Vec<Vec<f64>>], channels: &[Named], sample_rate_hz: f64) -> Result<Array, StageError> {
     hits.iter().try_for_each(|hit| as_many(hit.len(), channels))?;
     decay_array(hits, &[], channels, sample_rate_hz)
+}
+
+/// What `spectrum.etfe` hands on: a frequency response of one input and output with the expected squared errors. Errors:
+/// frequencies that do not ascend, lengths that do not fit.
+pub fn transfer(
+    frequency_hz: Vec<f64>,
+    transfer: Vec<Complex64>,
+    variance: Vec<f64>,
+    sample_rate_hz: f64,
+) -> Result<Array, StageError> {
+    ascending(&frequency_hz)?;
+    bare_transfer(frequency_hz, transfer, variance, sample_rate_hz)
 }
 
 fn as_many(found: usize, channels: &[Named]) -> Result<(), StageError> {

@@ -25,5 +25,7 @@ afmid --version
 echo "== tests and examples"
 python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest
 python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
-examples=(afmid.arrays_at_hand afmid.decays afmid.diagnoses afmid.identification afmid.numbers afmid.reading afmid.running)
+examples=(arrays_at_hand artifacts decays diagnoses identification numbers pairs reading
+    running)
+examples=("${examples[@]/#/afmid.}")
 python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

@@ -54,7 +54,7 @@ pub use quantity::quantity_of_unit;
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
 pub(crate) use shapes::{shape_array, shaped_mode};
-pub(crate) use transfer::{NewTransfer, Transfer};
+pub(crate) use transfer::{NewTransfer, Transfer, bare_transfer};
 
 use afmid_kernels::events::EventKind;
 use afmid_pipeline::recording::{WANTED_RATE, brief_number, is_rate};

@@ -98,6 +98,21 @@ impl NewTransfer<'_> {
     }
 }
 
+/// A frequency response of which no more is known. Errors: lengths that do not fit, a rate that is none.
+pub(crate) fn bare_transfer(
+    frequency_hz: Vec<f64>,
+    transfer: Vec<Complex64>,
+    variance: Vec<f64>,
+    sample_rate_hz: f64,
+) -> Result<Array, StageError> {
+    let labels = ["transfer function", "expected squared error"];
+    let array = over_frequency(frequency_hz, Vec::new(), transfer, variance, labels)
+        .attribute(SAMPLE_RATE_HZ, sample_rate_hz)
+        .attribute(DIFFERENCED, false);
+    Transfer::new(&array)?;
+    Ok(array)
+}
+
 fn over_frequency(
     frequency_hz: Vec<f64>,
     further_axes: Vec<Axis>,

@@ -26,7 +26,7 @@ pub use code_census::{CensusSettings, ChannelCensus, Found};
 pub use columns::Columns;
 pub use consistency::{Consistency, check_consistency};
 pub use file_patterns::{Match, matching_files};
-pub(crate) use frf::FRF;
+pub(crate) use frf::{FRF, ascending};
 pub use frf::{Frf, Roving};
 pub use memory::{MemorySource, memory_channel, memory_record};
 pub use natural_order::natural_order;
@@ -34,7 +34,7 @@ pub use overview::Overview;
 pub use records::Records;
 pub(crate) use repeats::{CopyOf, same_values, varies, warn_of_copies};
 pub(crate) use spectrum::DENSITY;
-pub use spectrum::Spectrum;
+pub use spectrum::{Spectrum, density_of_values};
 pub use stretch_extremes::StretchExtremes;
 
 /// The stages of this domain.

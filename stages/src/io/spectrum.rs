@@ -6,6 +6,7 @@ use afmid_kernels::spectra::averages_by_scatter;
 use afmid_pipeline::recording::{
     InputFiles, Reading, WholeFile, hertz, is_hdf5_file, read_number_attribute, read_series,
 };
+use afmid_pipeline::stage::NoProgress;
 use afmid_pipeline::{Array, Context, Example, Faults, Port, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -123,22 +124,12 @@ impl Stage for Spectrum {
             false => self.channels(cx.files(), path).map_err(|error| error.at(path))?,
         };
         check_spectrum(&f, &p).map_err(|error| error.at(path))?;
-        let stored = || if hdf5 { self.stored_averages(cx.files(), path) } else { Ok(None) };
         let averages = match self.averages {
-            Some(averages) => averages,
-            None => match stored()? {
-                Some(averages) => averages,
-                None => scattered_averages(&p, cx).map_err(|error| error.at(path))?,
-            },
+            None if hdf5 => self.stored_averages(cx.files(), path)?,
+            given => given,
         };
-        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
-        let inside = |f: f64| f >= self.lowest_hz && f <= highest;
-        let (f, p): (Vec<f64>, Vec<f64>) =
-            f.into_iter().zip(p).filter(|(f, _)| inside(*f)).map(|(f, p)| (f, p * self.scale)).unzip();
-        if f.is_empty() {
-            return Err(StageError::new("no frequency between `lowest_hz` and `highest_hz`").at(path));
-        }
-        Ok(Ports::new().with(&DENSITY, density_array(f, p, averages, &self.unit)))
+        let density = self.density(f, p, averages, cx).map_err(|error| error.at(path))?;
+        Ok(Ports::new().with(&DENSITY, density))
     }
 
     fn examples() -> Vec<Example> {
@@ -146,7 +137,36 @@ impl Stage for Spectrum {
     }
 }
 
+/// What the stage hands on of a density at hand, and what it warns of. Errors: as the stage.
+pub fn density_of_values(
+    frequency_hz: Vec<f64>,
+    density: Vec<f64>,
+    wanted: &Spectrum,
+) -> Result<(Array, Vec<String>), StageError> {
+    check_spectrum(&frequency_hz, &density)?;
+    let cx = Context::new(Path::new(""), 1, &NoProgress);
+    let density = wanted.density(frequency_hz, density, wanted.averages, &cx)?;
+    Ok((density, cx.into_warnings()))
+}
+
 impl Spectrum {
+    /// What lies between the limits, in its unit; of so many averages, or of as many as its scatter shows. Errors: nothing
+    /// lies there; no scatter.
+    fn density(&self, f: Vec<f64>, p: Vec<f64>, averages: Option<f64>, cx: &Context) -> Result<Array, StageError> {
+        let averages = match averages {
+            Some(averages) => averages,
+            None => scattered_averages(&p, cx)?,
+        };
+        let highest = self.highest_hz.unwrap_or(f64::INFINITY);
+        let inside = |f: f64| f >= self.lowest_hz && f <= highest;
+        let (f, p): (Vec<f64>, Vec<f64>) =
+            f.into_iter().zip(p).filter(|(f, _)| inside(*f)).map(|(f, p)| (f, p * self.scale)).unzip();
+        match f.is_empty() {
+            true => Err(StageError::new("no frequency between `lowest_hz` and `highest_hz`")),
+            false => Ok(density_array(f, p, averages, &self.unit)),
+        }
+    }
+
     /// Frequencies in hertz and density of a file that is not HDF5.
     fn channels(&self, files: &InputFiles, path: &Path) -> Result<(Vec<f64>, Vec<f64>), StageError> {
         let file = WholeFile::open(files, path, &Reading::of("auto", None))?;

@@ -6,7 +6,9 @@ mod artifact;
 mod at_hand;
 mod content;
 mod errors;
+mod from_content;
 mod inspect;
+mod page;
 mod program;
 mod read;
 mod stage;
@@ -20,9 +22,13 @@ mod native {
     #[pymodule_export]
     use crate::artifact::Artifact;
     #[pymodule_export]
-    use crate::at_hand::{decays, pair, recording};
+    use crate::at_hand::{decays, density, frf, pair, recording, transfer};
+    #[pymodule_export]
+    use crate::from_content::artifact;
     #[pymodule_export]
     use crate::inspect::inspect;
+    #[pymodule_export]
+    use crate::page::page;
     #[pymodule_export]
     use crate::program::main;
     #[pymodule_export]

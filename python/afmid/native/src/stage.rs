@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use afmid_pipeline::stage::NoProgress;
-use afmid_pipeline::{Context, Entry, Ports, toml};
+use afmid_pipeline::stage::{Bounds, NoProgress};
+use afmid_pipeline::{Context, DynStage, Entry, Ports, Stage, toml};
 use pyo3::prelude::*;
 
 use crate::artifact::Artifact;
@@ -18,6 +18,36 @@ type Outcome = (Vec<(String, Artifact)>, Vec<String>);
 fn entry(name: &str) -> PyResult<Entry> {
     let registry = afmid::registry().map_err(errors::config)?;
     registry.find(name).copied().ok_or_else(|| errors::config(format!("there is no stage `{name}`")))
+}
+
+/// The stage with these parameters. Errors: a parameter that is wrong, or beyond its range.
+fn parsed(entry: &Entry, params: toml::Table) -> PyResult<Box<dyn DynStage>> {
+    let stage = entry.parse(params.clone()).map_err(|error| {
+        let place = if matches!(error.path.as_str(), "" | ".") { String::new() } else { format!("`{}`: ", error.path) };
+        errors::config(format!("{place}{}", error.message))
+    })?;
+    if let Some(wrong) = Bounds::of(entry).check(&params).into_iter().next() {
+        return Err(errors::config(format!("`{}` {}", wrong.path.join("."), wrong.message)));
+    }
+    match stage.faults().into_iter().next() {
+        Some(fault) => Err(errors::config(fault.problem)),
+        None => Ok(stage),
+    }
+}
+
+/// Version and all parameters of a stage, of which these (JSON) are given. Errors: there is no such stage; as [`parsed`].
+pub fn with_all_params(name: &str, params: &str) -> PyResult<(u32, serde_json::Value)> {
+    let entry = entry(name)?;
+    let stage = parsed(&entry, serde_json::from_str(params).map_err(errors::config)?)?;
+    Ok((entry.spec.version, stage.params().map_err(errors::stage)?))
+}
+
+/// The parameters of a reader that arrays stand in for; `instead`: what it wants where a file was. Errors: as [`parsed`].
+pub fn checked<S: Stage>(params: &str, instead: (&str, serde_json::Value)) -> PyResult<S> {
+    let mut params: serde_json::Value = serde_json::from_str(params).map_err(errors::config)?;
+    params[instead.0] = instead.1;
+    parsed(&Entry::of::<S>(), serde_json::from_value(params.clone()).map_err(errors::config)?)?;
+    serde_json::from_value(params).map_err(errors::config)
 }
 
 /// Runs a stage with parameters (JSON; what is not stated has its default) on artifacts by port; returns its artifacts by
@@ -34,14 +64,7 @@ pub fn run_stage(
     seed: u64,
     base: &str,
 ) -> PyResult<Outcome> {
-    let params: toml::Table = serde_json::from_str(params).map_err(errors::config)?;
-    let stage = entry(name)?.parse(params).map_err(|error| {
-        let place = if matches!(error.path.as_str(), "" | ".") { String::new() } else { format!("`{}`: ", error.path) };
-        errors::config(format!("{place}{}", error.message))
-    })?;
-    if let Some(fault) = stage.faults().into_iter().next() {
-        return Err(errors::config(fault.problem));
-    }
+    let stage = parsed(&entry(name)?, serde_json::from_str(params).map_err(errors::config)?)?;
     let mut ports = Ports::new();
     for (port, artifact) in &inputs {
         ports.insert(port, artifact.get().0.clone());

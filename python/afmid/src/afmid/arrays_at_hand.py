@@ -37,6 +37,18 @@ def real(values: Any, what: str) -> Array:
     return np.ascontiguousarray(found, dtype=np.float64)
 
 
+def complex_values(values: Any, what: str) -> Array:
+    """An array of complex numbers. Errors: `DataError`, no numbers.
+
+    >>> complex_values([1, 2j], "responses")
+    array([1.+0.j, 0.+2.j])
+    """
+    found = np.asarray(values)
+    if found.dtype == object or not np.issubdtype(found.dtype, np.number):
+        raise DataError(f"{what} is an array of {found.dtype}, wanted numbers")
+    return np.ascontiguousarray(found, dtype=np.complex128)
+
+
 def records(y: Any, axes: str | None) -> list[list[Array]]:
     """Records of channels of samples.
 
@@ -71,6 +83,37 @@ def records(y: Any, axes: str | None) -> list[list[Array]]:
     if found.ndim == 3:
         return [list(hit) for hit in found]
     raise DataError(f"y has {found.ndim} axes, wanted samples; hits or channels, samples; or hits, channels, samples")
+
+
+def recorded(values: Any, what: str) -> list[list[Array]]:
+    """Records of the channels of an input or output: (samples,), (channels, samples) or (records, channels, samples); a
+    list of (samples,) or (channels, samples) where records have unlike lengths.
+
+    >>> [len(record) for record in recorded(np.zeros((2, 100)), "u")]
+    [2]
+    >>> [len(record) for record in recorded([np.zeros(100), np.zeros(90)], "u")]
+    [1, 1]
+    >>> recorded(np.zeros((100, 2)), "u")
+    Traceback (most recent call last):
+    afmid.errors.DataError: u has the shape (100, 2): 100 channels of 2 samples; is u.T meant?
+    """
+    if isinstance(values, (list, tuple)) and values and all(np.ndim(part) > 0 for part in values):
+        if len({np.shape(part)[-1] for part in values}) > 1:
+            parts = [real(part, f"{what}[{k}]") for k, part in enumerate(values)]
+            if any(part.ndim > 2 for part in parts):
+                raise DataError(f"the records in {what} want one or two axes: samples; channels, samples")
+            return [list(np.atleast_2d(part)) for part in parts]
+    found = real(values, what)
+    if not 1 <= found.ndim <= 3:
+        wanted = "samples; channels, samples; or records, channels, samples"
+        raise DataError(f"{what} has {found.ndim} axes, wanted {wanted}")
+    if found.size == 0:
+        raise DataError(f"{what} has the shape {found.shape}: no samples")
+    shaped = found.reshape((1,) * (3 - found.ndim) + found.shape)
+    if shaped.shape[1] > shaped.shape[2]:
+        problem = f"{what} has the shape {found.shape}: {shaped.shape[1]} channels of {shaped.shape[2]} samples"
+        raise DataError(problem, help=f"is {what}.T meant?")
+    return [list(record) for record in shaped]
 
 
 def _unequal(y: Sequence[Any], axes: str | None) -> list[list[Array]]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
-from . import _native, artifacts
-from .arrays_at_hand import names, rate, real
+from . import artifacts
+from .arrays_at_hand import rate
 from .decays import free_decays
 from .numbers import html_table, text_table, with_error
+from .pairs import pair_of_one_output
 
+STAGE = "diagnosis.causes"
 HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
 
 
@@ -41,7 +41,6 @@ class Diagnosis:
     """What is not alright, in the program's words."""
     details: dict[str, Any] = field(default_factory=dict)
     """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
-
     def _rows(self) -> list[list[str]]:
         rows = []
         for parameter in self.parameters.itertuples():
@@ -134,24 +133,17 @@ def diagnose(
     if u is None:
         inputs["decays"], _, said = free_decays(y, rate_hz, axes, begin, None, output_unit)
     else:
-        inputs_given = np.atleast_2d(real(u, "u"))
-        inputs["pair"], said = _native.pair(
-            list(inputs_given),
-            [real(y, "y")],
-            names(None, input_unit, len(inputs_given), "input"),
-            names(None, output_unit, 1, "output"),
-            rate_hz,
-            json.dumps({"remove": remove}),
+        inputs["pair"], said = pair_of_one_output(
+            u, y, sample_rate_hz=rate_hz, remove=remove, input_unit=input_unit, output_unit=output_unit
         )
-    made, more = artifacts.run_stage(
-        "diagnosis.causes",
-        inputs,
-        candidates=list(candidates),
-        without=list(without),
-        most_causes=most_causes,
-        false_alarm_rate=false_alarm_rate,
-        senses=senses,
-    )
+    params: dict[str, Any] = {
+        "candidates": list(candidates),
+        "without": list(without),
+        "most_causes": most_causes,
+        "false_alarm_rate": false_alarm_rate,
+        "senses": senses,
+    }
+    made, more = artifacts.run_stage(STAGE, inputs, **params)
     said = [*said, *more]
     artifacts.warn(said)
     answer = artifacts.document(made["summary"])

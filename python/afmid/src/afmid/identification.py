@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
-from . import _native, artifacts
-from .arrays_at_hand import names, rate, real
-from .errors import DataError
+from . import artifacts
 from .model import Model
 from .numbers import MODE_HEADS, html_table, mode_rows, text_table
+from .pairs import pair_of_one_output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentifiedModel(Model):
-    """A model with its modes, as `afmid.pem` returns it."""
+    """A model with its modes, as `afmid.pem`, `afmid.subspace` and `afmid.vector_fitting` return it."""
 
     modes: pd.DataFrame = field(default_factory=pd.DataFrame)
     """A row per resonance, ascending, with standard errors."""
     roots: pd.DataFrame = field(default_factory=pd.DataFrame)
     """All poles and zeros, and what each is."""
     residuals: xr.Dataset = field(default_factory=xr.Dataset)
-    """Prediction errors and predictions over time."""
+    """Prediction errors and predictions over time; none of a model that `afmid.pem` has not fitted."""
     warnings: tuple[str, ...] = ()
     """What is not alright, in the program's words."""
     details: dict[str, Any] = field(default_factory=dict)
@@ -140,17 +137,15 @@ def pem(
     >>> model.order, model.modes.frequency_hz.round(1).tolist()
     (2, [90.7])
     """
-    inputs_given = np.atleast_2d(real(u, "u"))
-    output_given = real(y, "y")
-    if output_given.ndim != 1 or inputs_given.ndim != 2:
-        raise DataError(f"u has the shape {inputs_given.shape} and y {output_given.shape}, wanted (inputs, samples), (samples,)")
-    pair, said = _native.pair(
-        list(inputs_given),
-        [output_given],
-        names(inputs, input_unit, len(inputs_given), "input"),
-        names(None if output is None else [output], output_unit, 1, "output"),
-        rate(sample_rate_hz),
-        json.dumps({"remove": remove}),
+    pair, said = pair_of_one_output(
+        u,
+        y,
+        sample_rate_hz=sample_rate_hz,
+        remove=remove,
+        inputs=inputs,
+        output=output,
+        input_unit=input_unit,
+        output_unit=output_unit,
     )
     fitted, more = artifacts.run_stage(
         "model.pem",
@@ -166,16 +161,21 @@ def pem(
         drift=drift,
         max_iterations=max_iterations,
     )
+    model = identified(fitted, [*said, *more])
+    artifacts.warn(list(model.warnings))
+    return model
+
+
+def identified(fitted: dict[str, Any], said: list[str]) -> IdentifiedModel:
+    """What a stage that fits a model has handed on, with the model's modes."""
     modes, of_modes = artifacts.run_stage("model.modes", {"model": fitted["model"]})
-    said = [*said, *more, *of_modes]
-    artifacts.warn(said)
     content = fitted["model"].content()
     content["parameter_names"] = tuple(content["parameter_names"])
     return IdentifiedModel(
         **content,
         modes=artifacts.table(modes["modes"]),
         roots=artifacts.table(modes["roots"]),
-        residuals=artifacts.array(fitted["residuals"]),
-        warnings=tuple(said),
+        residuals=artifacts.array(fitted["residuals"]) if "residuals" in fitted else xr.Dataset(),
+        warnings=(*said, *of_modes),
         details=artifacts.document(fitted["summary"]),
     )

@@ -62,7 +62,10 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], said: Iterab
     >>> html_table(["a"], [["1"]], ["b < c"])
     '<table><tr><th>a</th></tr><tr><td>1</td></tr></table><ul><li>b &lt; c</li></ul>'
     """
-    line = lambda cells, kind: "<tr>" + "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in cells) + "</tr>"  # noqa: E731
+
+    def line(cells: Sequence[str], kind: str) -> str:
+        return "<tr>" + "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in cells) + "</tr>"
+
     below = "".join(f"<li>{escape(text)}</li>" for text in said)
     table = "<table>" + line(heads, "th") + "".join(line(row, "td") for row in rows) + "</table>"
     return table + (f"<ul>{below}</ul>" if below else "")

@@ -10,7 +10,7 @@ mod stretch;
 #[cfg(test)]
 mod tests;
 
-pub use at_hand::pair_of_series;
+pub use at_hand::{Recorded, pair_of_series};
 pub use selection::Column;
 pub use stage::Columns;
 pub use stretch::{Removal, Stretch, Trend, halves};

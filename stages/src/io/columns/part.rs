@@ -85,7 +85,11 @@ impl Part {
         rate: f64,
     ) -> Result<Self, StageError> {
         let names = |all: &[Named]| all.iter().map(|named| named.name.clone()).collect::<Vec<_>>();
-        let unit = |all: &[Named]| all.first().map_or(String::new(), |first| first.unit.clone());
+        // as of a file that states none
+        let unit = |all: &[Named]| match all.first().map_or("", |first| &first.unit) {
+            "" => "1".to_owned(),
+            unit => unit.to_owned(),
+        };
         let samples = outputs.first().map_or(0, Vec::len);
         let named = input_names.iter().chain(output_names).zip(inputs.iter().chain(&outputs));
         if let Some((other, values)) = named.clone().find(|(_, values)| values.len() != samples) {

@@ -29,7 +29,11 @@ impl Assembled {
         hashes: &[String],
         read: Vec<Vec<FileResponse>>,
     ) -> Result<Self, StageError> {
-        let all = named(paths, read);
+        Self::of(wanted, hashes, named(paths, read))
+    }
+
+    /// Of responses that have their names. Errors: as [`Assembled::new`].
+    pub fn of(wanted: &Frf, hashes: &[String], all: Vec<Named<'_>>) -> Result<Self, StageError> {
         let frequency_hz = common_frequencies(&all)?;
         check_lengths(wanted, all.len())?;
         let Understood { quantity, unit, factor, remark } = Understood::new(wanted.quantity, &unit(wanted, &all)?)?;
@@ -59,10 +63,14 @@ impl Assembled {
         }
         let rows: Option<Vec<&Vec<f64>>> = all.iter().map(|named| named.response.coherence.as_ref()).collect();
         let coherence = rows.map(|rows| rows.iter().flat_map(|row| row[kept.clone()].to_vec()).collect());
+        let squared = |row: &Vec<f64>| row[kept.clone()].iter().map(|v| v * (factor * factor)).collect::<Vec<f64>>();
+        let rows: Option<Vec<&Vec<f64>>> = all.iter().map(|named| named.variance.as_ref()).collect();
+        let variance = rows.map(|rows| rows.into_iter().flat_map(squared).collect());
         let mut frf = NewFrf {
             frequency_hz: frequency_hz[kept].to_vec(),
             responses,
             frf,
+            variance,
             coherence,
             quantity,
             unit,
@@ -98,12 +106,14 @@ impl Assembled {
 }
 
 /// A response with the file that it is from and its name: the file's, and its own if the file has several.
-struct Named<'a> {
-    name: String,
-    path: &'a Path,
+pub(super) struct Named<'a> {
+    pub name: String,
+    pub path: &'a Path,
     /// Number of its file, and its own among the responses of that.
-    place: [usize; 2],
-    response: FileResponse,
+    pub place: [usize; 2],
+    pub response: FileResponse,
+    /// Expected squared error of each value, which no file states.
+    pub variance: Option<Vec<f64>>,
 }
 
 impl Named<'_> {
@@ -147,7 +157,7 @@ fn named(paths: &[PathBuf], read: Vec<Vec<FileResponse>>) -> Vec<Named<'_>> {
                 (true, true) => response.location.clone(),
                 (true, false) => format!("{file}:{}", response.location),
             };
-            all.push(Named { name, path, place: [number, own], response });
+            all.push(Named { name, path, place: [number, own], response, variance: None });
         }
     }
     all
