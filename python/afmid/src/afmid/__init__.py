@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .reading import inspect, read
     from .recording import Recording
     from .response import frequency_response
+    from .responses import MeasuredFrf, frf
     from .result import Result, open
     from .running import run
     from .stage import Source, Stage
@@ -60,6 +61,7 @@ _PLACES = {
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
     "response": ("frequency_response",),
+    "responses": ("MeasuredFrf", "frf"),
     "result": ("Result", "open"),
     "running": ("run",),
     "stage": ("Source", "Stage"),
@@ -74,6 +76,7 @@ __all__ = [
     "DataError",
     "Diagnosis",
     "IdentifiedModel",
+    "MeasuredFrf",
     "Model",
     "NoCovariance",
     "NotAResult",
@@ -86,6 +89,7 @@ __all__ = [
     "UnknownName",
     "diagnose",
     "frequency_response",
+    "frf",
     "inspect",
     "open",
     "pem",

@@ -8,6 +8,7 @@ from .errors import AfmidError
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # colour-blind safe, as the pages of the program have them
@@ -34,6 +35,44 @@ def decay(fit: xr.Dataset, figure: Figure | None) -> Figure:
     axes.set_xlabel("time (s)")
     axes.legend(loc="upper right")
     return figure
+
+
+MOST_ROWS = 6
+"""Responses that are drawn each by itself."""
+
+
+def responses(found: xr.Dataset, figure: Figure | None) -> Figure:
+    """Magnitude, phase and coherence, a column of axes for each of the first responses."""
+    count = min(found.sizes["response"], MOST_ROWS)
+    known = "coherence" in found
+    figure = _figure(figure, figsize=(2 + 5 * count, 7 if known else 5))
+    rows = [3, 2, 1] if known else [3, 2]
+    grid = figure.subplots(len(rows), count, sharex=True, squeeze=False, height_ratios=rows)
+    for number in range(count):
+        one, axes = found.isel(response=number), grid[:, number]
+        band(axes[0], one.frequency_hz, one["magnitude"], one.get("magnitude_std"), MEASURED)
+        axes[0].set_yscale("log")
+        axes[0].set_title(str(one.response.item()))
+        axes[1].plot(one.frequency_hz, one["phase"], color=MEASURED, linewidth=0.8)
+        if known:
+            axes[2].plot(one.frequency_hz, one["coherence"], color=MEASURED, linewidth=0.8)
+            axes[2].set_ylim(0, 1.05)
+        axes[-1].set_xlabel("frequency (Hz)")
+    units = found["frf"].attrs.get("units", "")
+    for axes, label in zip(grid[:, 0], [f"magnitude ({units})", "phase (rad)", "coherence"], strict=False):
+        axes.set_ylabel(label)
+    return figure
+
+
+def band(
+    axes: Axes, at: Any, values: xr.DataArray, std: xr.DataArray | None, colour: str, label: str | None = None
+) -> None:
+    """A curve with two standard errors on either side."""
+    axes.plot(at, values, color=colour, linewidth=0.8, label=label)
+    if std is not None:
+        # on a logarithmic axis what reaches below zero is cut off above it
+        low = (values - 2 * std).where(values > 2 * std, values / 100)
+        axes.fill_between(at, low, values + 2 * std, color=colour, alpha=0.25, linewidth=0)
 
 
 def bode(response: xr.Dataset, figure: Figure | None) -> Figure:
