@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .reading import inspect, read
     from .recording import Recording
     from .response import frequency_response
+    from .response_modes import FrfModes, frf_modes
     from .responses import MeasuredFrf, frf
     from .result import Result, open
     from .running import run
@@ -61,6 +62,7 @@ _PLACES = {
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
     "response": ("frequency_response",),
+    "response_modes": ("FrfModes", "frf_modes"),
     "responses": ("MeasuredFrf", "frf"),
     "result": ("Result", "open"),
     "running": ("run",),
@@ -75,6 +77,7 @@ __all__ = [
     "Damaged",
     "DataError",
     "Diagnosis",
+    "FrfModes",
     "IdentifiedModel",
     "MeasuredFrf",
     "Model",
@@ -90,6 +93,7 @@ __all__ = [
     "diagnose",
     "frequency_response",
     "frf",
+    "frf_modes",
     "inspect",
     "open",
     "pem",

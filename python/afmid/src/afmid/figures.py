@@ -64,6 +64,24 @@ def responses(found: xr.Dataset, figure: Figure | None) -> Figure:
     return figure
 
 
+def fitted_responses(fit: xr.Dataset, modes: Any, figure: Figure | None) -> Figure:
+    """Magnitudes of all responses as measured and as fitted, the mode indicator, and where the modes are."""
+    figure = _figure(figure, figsize=(8, 6))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    for number in range(fit.sizes["channel"]):
+        one = fit.isel(channel=number)
+        upper.semilogy(fit.frequency_hz, abs(one["measured"]), color=MEASURED, linewidth=0.6)
+        upper.semilogy(fit.frequency_hz, abs(one["fitted"]), color=FITTED, linewidth=0.8)
+    lower.semilogy(fit.frequency_hz, fit["indicator"], color=MEASURED, linewidth=0.8)
+    for frequency_hz in modes.frequency_hz:
+        lower.axvline(frequency_hz, color=LEFT, linewidth=0.8)
+    upper.set_ylabel(f"magnitude ({fit['measured'].attrs.get('units') or '1'})")
+    upper.legend(upper.lines[:2], ["measured", "fitted"], loc="upper right")
+    lower.set_ylabel("mode indicator")
+    lower.set_xlabel("frequency (Hz)")
+    return figure
+
+
 def band(
     axes: Axes, at: Any, values: xr.DataArray, std: xr.DataArray | None, colour: str, label: str | None = None
 ) -> None:
