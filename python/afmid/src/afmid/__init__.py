@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         OtherFormat,
         UnknownName,
     )
-    from .identification import IdentifiedModel, pem
+    from .identification import IdentifiedModel, pem, subspace
     from .model import Model
     from .reading import inspect, read
     from .recording import Recording
@@ -57,7 +57,7 @@ _PLACES = {
         "OtherFormat",
         "UnknownName",
     ),
-    "identification": ("IdentifiedModel", "pem"),
+    "identification": ("IdentifiedModel", "pem", "subspace"),
     "model": ("Model",),
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
@@ -100,6 +100,7 @@ __all__ = [
     "read",
     "ringdown",
     "run",
+    "subspace",
 ]
 
 

@@ -166,6 +166,103 @@ def pem(
     return model
 
 
+def subspace(
+    u: Any,
+    y: Any,
+    *,
+    sample_rate_hz: float,
+    order: str | int = "auto",
+    max_order: int = 16,
+    weight: str = "cva",
+    block_rows: int = 60,
+    offset: bool = True,
+    drift: bool = False,
+    remove: str = "mean",
+    inputs: Sequence[str] | None = None,
+    output: str | None = None,
+    input_unit: str = "",
+    output_unit: str = "",
+) -> IdentifiedModel:
+    """A state-space model from measured input and output by a subspace method, without iteration.
+
+    `x(t + Ts) = A x + B u`, `y = C x + D u + e + offset`; K is not estimated. Consistent, but with larger errors than
+    those of `afmid.pem`. The same numbers as the stages `model.subspace` and `model.modes` of the program give for the
+    same samples.
+
+    Parameters
+    ----------
+    u : array_like
+        Input, (samples,), or inputs, (inputs, samples).
+    y : array_like
+        Output, (samples,).
+    sample_rate_hz : float
+        Samples per second.
+    order : "auto" or int
+        Number of states; "auto" as in `afmid.pem`, by output error.
+    max_order : int
+        Largest order that "auto" tries.
+    weight : {"cva", "n4sid", "moesp", "release"}
+        What is weighted: canonical variates, the oblique or the orthogonal projection; "release" takes the future
+        itself, without instruments, for inputs that do not excite.
+    block_rows : int
+        Rows of each Hankel matrix, more than the order; a period of the slowest mode or more.
+    offset, drift : bool
+        Whether an offset and a linear drift of the output are estimated.
+    remove : {"mean", "line", "none"}
+        What is taken off input and output before, by the constants of the first half.
+    inputs, output : str, optional
+        Names of the channels.
+    input_unit, output_unit : str
+        Their units.
+
+    Returns
+    -------
+    IdentifiedModel
+
+    Raises
+    ------
+    DataError
+        Data that cannot be used: too few samples for the block rows, missing samples, a constant output.
+    ConfigError
+        A parameter that is wrong.
+
+    Examples
+    --------
+    >>> import numpy as np, afmid
+    >>> rng = np.random.default_rng(1)
+    >>> u = rng.standard_normal(2000)
+    >>> y = np.zeros(2000)
+    >>> for k in range(2, 2000):
+    ...     y[k] = 1.6 * y[k - 1] - 0.9 * y[k - 2] + 0.3 * u[k - 1]
+    >>> model = afmid.subspace(u, y + 0.01 * rng.standard_normal(2000), sample_rate_hz=1e3, order=2)
+    >>> model.modes.frequency_hz.round(1).tolist()
+    [90.7]
+    """
+    pair, said = pair_of_one_output(
+        u,
+        y,
+        sample_rate_hz=sample_rate_hz,
+        remove=remove,
+        inputs=inputs,
+        output=output,
+        input_unit=input_unit,
+        output_unit=output_unit,
+    )
+    fitted, more = artifacts.run_stage(
+        "model.subspace",
+        {"pair": pair},
+        order=order,
+        max_order=max_order,
+        weight=weight,
+        block_rows=block_rows,
+        offset=offset,
+        drift=drift,
+    )
+    model = identified(fitted, [*said, *more])
+    artifacts.warn(list(model.warnings))
+    return model
+
+
 def identified(fitted: dict[str, Any], said: list[str]) -> IdentifiedModel:
     """What a stage that fits a model has handed on, with the model's modes."""
     modes, of_modes = artifacts.run_stage("model.modes", {"model": fitted["model"]})
