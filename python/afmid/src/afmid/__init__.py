@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .decays import Ringdown, ringdown
+    from .densities import PowerDensity, welch
     from .diagnoses import Diagnosis, diagnose
     from .errors import (
         AfmidError,
@@ -40,11 +41,13 @@ if TYPE_CHECKING:
     from .result import Result, open
     from .running import run
     from .stage import Source, Stage
+    from .thermal import ThermalFit, thermal_fit
 
 __version__ = "0.2.0"
 
 _PLACES = {
     "decays": ("Ringdown", "ringdown"),
+    "densities": ("PowerDensity", "welch"),
     "diagnoses": ("Diagnosis", "diagnose"),
     "errors": (
         "AfmidError",
@@ -67,6 +70,7 @@ _PLACES = {
     "result": ("Result", "open"),
     "running": ("run",),
     "stage": ("Source", "Stage"),
+    "thermal": ("ThermalFit", "thermal_fit"),
 }
 # NumPy, pandas, xarray and h5py take half a second: each is imported with the first name that needs it
 _MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
@@ -84,11 +88,13 @@ __all__ = [
     "NoCovariance",
     "NotAResult",
     "OtherFormat",
+    "PowerDensity",
     "Recording",
     "Result",
     "Ringdown",
     "Source",
     "Stage",
+    "ThermalFit",
     "UnknownName",
     "diagnose",
     "frequency_response",
@@ -101,6 +107,8 @@ __all__ = [
     "ringdown",
     "run",
     "subspace",
+    "thermal_fit",
+    "welch",
 ]
 
 

@@ -82,6 +82,34 @@ def fitted_responses(fit: xr.Dataset, modes: Any, figure: Figure | None) -> Figu
     return figure
 
 
+def densities(channels: list[tuple[str, xr.Dataset]], figure: Figure | None) -> Figure:
+    """Densities over frequency, a row of axes per channel; zero hertz is left out."""
+    figure = _figure(figure, figsize=(8, 1 + 3 * len(channels)))
+    grid = figure.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (name, one) in zip(grid, channels, strict=True):
+        one = one.isel(frequency_hz=slice(1, None))
+        band(axes, one.frequency_hz, one["density"], one["standard_error"], FITTED)
+        axes.set_yscale("log")
+        axes.set_ylabel(f"density ({one['density'].attrs.get('units', '')})")
+        axes.set_title(name)
+    grid[-1].set_xlabel("frequency (Hz)")
+    return figure
+
+
+def thermal(fit: xr.Dataset, figure: Figure | None) -> Figure:
+    """Density and fit, and their ratio."""
+    figure = _figure(figure, figsize=(8, 6))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
+    upper.semilogy(fit.frequency_hz, fit["density"], color=MEASURED, linewidth=0.6, label="measured")
+    upper.semilogy(fit.frequency_hz, fit["model"], color=FITTED, linewidth=1.2, label="fitted")
+    upper.set_ylabel(f"density ({fit['density'].attrs.get('units', '')})")
+    upper.legend(loc="upper right")
+    lower.plot(fit.frequency_hz, fit["ratio"], color=LEFT, linewidth=0.6)
+    lower.set_ylabel("ratio")
+    lower.set_xlabel("frequency (Hz)")
+    return figure
+
+
 def band(
     axes: Axes, at: Any, values: xr.DataArray, std: xr.DataArray | None, colour: str, label: str | None = None
 ) -> None:
