@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     )
     from .identification import IdentifiedModel, pem, subspace
     from .model import Model
+    from .rational import vector_fitting
     from .reading import inspect, read
     from .recording import Recording
     from .response import frequency_response
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from .responses import MeasuredFrf, frf
     from .result import Result, open
     from .running import run
+    from .smoothed import SmoothedResponse, smoothing
     from .stage import Source, Stage
     from .thermal import ThermalFit, thermal_fit
 
@@ -62,6 +64,7 @@ _PLACES = {
     ),
     "identification": ("IdentifiedModel", "pem", "subspace"),
     "model": ("Model",),
+    "rational": ("vector_fitting",),
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
     "response": ("frequency_response",),
@@ -69,6 +72,7 @@ _PLACES = {
     "responses": ("MeasuredFrf", "frf"),
     "result": ("Result", "open"),
     "running": ("run",),
+    "smoothed": ("SmoothedResponse", "smoothing"),
     "stage": ("Source", "Stage"),
     "thermal": ("ThermalFit", "thermal_fit"),
 }
@@ -92,6 +96,7 @@ __all__ = [
     "Recording",
     "Result",
     "Ringdown",
+    "SmoothedResponse",
     "Source",
     "Stage",
     "ThermalFit",
@@ -106,8 +111,10 @@ __all__ = [
     "read",
     "ringdown",
     "run",
+    "smoothing",
     "subspace",
     "thermal_fit",
+    "vector_fitting",
     "welch",
 ]
 

@@ -110,6 +110,22 @@ def thermal(fit: xr.Dataset, figure: Figure | None) -> Figure:
     return figure
 
 
+def smoothed(etfe: xr.Dataset, found: xr.Dataset, figure: Figure | None) -> Figure:
+    """Magnitude and phase of an estimate and of the smoothed one."""
+    figure = _figure(figure, figsize=(8, 6))
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(etfe.frequency_hz, etfe["magnitude"], color=MEASURED, linewidth=0.5, label="estimate")
+    band(upper, found.frequency_hz, found["magnitude"], found["magnitude_std"], FITTED, "smoothed")
+    upper.set_yscale("log")
+    upper.set_ylabel("magnitude")
+    upper.legend(loc="upper right")
+    lower.plot(etfe.frequency_hz, etfe["phase"], color=MEASURED, linewidth=0.5)
+    lower.plot(found.frequency_hz, found["phase"], color=FITTED, linewidth=0.8)
+    lower.set_ylabel("phase (rad)")
+    lower.set_xlabel("frequency (Hz)")
+    return figure
+
+
 def band(
     axes: Axes, at: Any, values: xr.DataArray, std: xr.DataArray | None, colour: str, label: str | None = None
 ) -> None:
