@@ -1,6 +1,8 @@
 """`afmid.diagnose` and `afmid.run`."""
 
+import copy
 import json
+import pickle
 
 import afmid
 import numpy as np
@@ -31,6 +33,17 @@ def test_dry_friction_is_named_and_a_linear_decay_is_clean():
     assert "coulomb" in found.summary() and found._repr_html_().startswith("<p>named")
     clean = afmid.diagnose(friction(1, 0.0), sample_rate_hz=RATE_HZ, begin=0)
     assert clean.verdict == "clean" and len(clean.causes) == 0
+
+
+def test_the_page_is_written_of_a_copy_too(tmp_path):
+    found = afmid.diagnose(friction(2, 2e-3), sample_rate_hz=RATE_HZ, begin=0, output_unit="V")
+    found.report(tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert text.startswith("<!") and "coulomb-friction" in text and "<svg" in text
+    for number, again in enumerate((pickle.loads(pickle.dumps(found)), copy.deepcopy(found))):
+        assert again.verdict == found.verdict and again.causes.equals(found.causes)
+        again.report(tmp_path / f"{number}.html")
+        assert (tmp_path / f"{number}.html").read_text(encoding="utf-8") == text
 
 
 def test_a_cause_that_is_none_is_refused():

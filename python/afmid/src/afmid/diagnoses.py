@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import xarray as xr
 
-from . import artifacts
+from . import _native, artifacts
 from .arrays_at_hand import rate
 from .decays import free_decays
 from .numbers import html_table, text_table, with_error
@@ -41,6 +43,18 @@ class Diagnosis:
     """What is not alright, in the program's words."""
     details: dict[str, Any] = field(default_factory=dict)
     """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
+    made: dict[str, Any] = field(default_factory=dict)
+    """What the stage was given and has handed on, for the page."""
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Writes the page that `afmid report` writes: verdict, overlays, errors by frequency and by the output's size,
+        the ladder of models; one file that loads nothing else.
+        """
+        ports = [(port, _native.artifact(*of)) for port, of in self.made["ports"].items()]
+        params = artifacts.as_json(self.made["params"])
+        text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings))
+        Path(path).write_text(text, encoding="utf-8")
+
     def _rows(self) -> list[list[str]]:
         rows = []
         for parameter in self.parameters.itertuples():
@@ -165,4 +179,5 @@ def diagnose(
         errors=artifacts.array(made["errors"]),
         warnings=tuple(said),
         details=answer,
+        made={"params": params, "ports": {port: (one.shape, one.content()) for port, one in made.items()}},
     )
