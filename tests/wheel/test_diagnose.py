@@ -37,6 +37,7 @@ def test_dry_friction_is_named_and_a_linear_decay_is_clean():
 
 def test_the_page_is_written_of_a_copy_too(tmp_path):
     found = afmid.diagnose(friction(2, 2e-3), sample_rate_hz=RATE_HZ, begin=0, output_unit="V")
+    assert [axes.get_ylabel() for axes in found.plot().axes] == ["output (V)", "residual (V)"]
     found.report(tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert text.startswith("<!") and "coulomb-friction" in text and "<svg" in text

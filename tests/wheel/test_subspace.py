@@ -57,7 +57,7 @@ def test_a_model_simulates_and_is_pickled_copied_and_shown():
     assert np.std((y - np.mean(y) - found.simulate(u - np.mean(u)))[100:]) < 0.02
     for again in (pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)):
         assert np.array_equal(again.A, found.A) and again.modes.equals(found.modes)
-    assert len(found.bode().axes) == 2 and len(found.residuals) == 0
+    assert len(found.plot().axes) == 2 and len(found.residuals) == 0
 
 
 def test_bad_input_is_refused_with_what_was_found():

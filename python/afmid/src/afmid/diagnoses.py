@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import xarray as xr
@@ -16,6 +16,9 @@ from .arrays_at_hand import rate
 from .decays import free_decays
 from .numbers import html_table, text_table, with_error
 from .pairs import pair_of_one_output
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STAGE = "diagnosis.causes"
 HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
@@ -45,6 +48,14 @@ class Diagnosis:
     """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
     made: dict[str, Any] = field(default_factory=dict)
     """What the stage was given and has handed on, for the page."""
+
+    def plot(self, figure: Figure | None = None) -> Figure:
+        """The output as measured and as simulated without and with the causes, and what either leaves. Needs
+        matplotlib.
+        """
+        from .figures import diagnosis
+
+        return diagnosis(self.simulation, figure)
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Writes the page that `afmid report` writes: verdict, overlays, errors by frequency and by the output's size,

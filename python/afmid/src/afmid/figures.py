@@ -37,6 +37,22 @@ def decay(fit: xr.Dataset, figure: Figure | None) -> Figure:
     return figure
 
 
+def diagnosis(simulation: xr.Dataset, figure: Figure | None) -> Figure:
+    """Measured, simulated without and with the causes, and what either leaves."""
+    figure = _figure(figure, figsize=(8, 6))
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(simulation.time, simulation["measured"], color=MEASURED, linewidth=0.8, label="measured")
+    for name, colour, label in (("before", LEFT, "linear model"), ("after", FITTED, "with the causes")):
+        upper.plot(simulation.time, simulation[name], color=colour, linewidth=0.8, label=label)
+        lower.plot(simulation.time, simulation["measured"] - simulation[name], color=colour, linewidth=0.8)
+    unit = simulation["measured"].attrs.get("units", "")
+    upper.set_ylabel(f"output ({unit})")
+    upper.legend(loc="upper right")
+    lower.set_ylabel(f"residual ({unit})")
+    lower.set_xlabel("time (s)")
+    return figure
+
+
 MOST_ROWS = 6
 """Responses that are drawn each by itself."""
 

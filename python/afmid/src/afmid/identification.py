@@ -52,6 +52,10 @@ class IdentifiedModel(Model):
 
         return bode(self.frequency_response(frequency_hz), figure)
 
+    def plot(self, figure: Figure | None = None) -> Figure:
+        """As `bode`, at the frequencies of `frequency_response`. Needs matplotlib."""
+        return self.bode(figure=figure)
+
 
 def pem(
     u: Any,
