@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use afmid_kernels::spectra::{resonance_segment, segment_samples};
 use afmid_pipeline::recording::Raw;
 use afmid_pipeline::{Array, Channel, Recording, StageError};
 use num_complex::Complex64;
@@ -57,6 +58,12 @@ pub fn transfer(
 ) -> Result<Array, StageError> {
     ascending(&frequency_hz)?;
     bare_transfer(frequency_hz, transfer, variance, sample_rate_hz)
+}
+
+/// Samples of the segments over which the spectrum of a record of noise is averaged, as `new pipeline` takes them: so that
+/// its resonance is resolved; where it has none, at least 30 in the record.
+pub fn noise_segment_samples(values: &[f64]) -> usize {
+    resonance_segment(values).unwrap_or_else(|| segment_samples(values.len()))
 }
 
 fn as_many(found: usize, channels: &[Named]) -> Result<(), StageError> {

@@ -103,6 +103,13 @@ pub fn density(
     Ok((Artifact(density.wrap()), warnings))
 }
 
+/// Samples of the segments over which the spectrum of a record of noise is averaged.
+#[pyfunction]
+pub fn segment_samples(py: Python<'_>, values: PyReadonlyArray1<'_, f64>) -> usize {
+    let values = values.as_array().to_vec();
+    py.detach(|| at_hand::noise_segment_samples(&values))
+}
+
 /// The frequency response of one input and output, with the expected squared errors. Errors: unlike lengths.
 #[pyfunction]
 pub fn transfer(

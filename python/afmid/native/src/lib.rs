@@ -22,7 +22,7 @@ mod native {
     #[pymodule_export]
     use crate::artifact::Artifact;
     #[pymodule_export]
-    use crate::at_hand::{decays, density, frf, pair, recording, transfer};
+    use crate::at_hand::{decays, density, frf, pair, recording, segment_samples, transfer};
     #[pymodule_export]
     use crate::from_content::artifact;
     #[pymodule_export]

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 HEADS = ("channel", "bins", "width (Hz)", "averages", "root mean square", "unit", "largest at (Hz)")
 STORED = ("density", "standard_error", "record_error")
 """The variables of the artifact."""
-LARGEST_SEGMENT = 1 << 21
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,16 +70,6 @@ class PowerDensity:
         return densities(self._channels(), figure)
 
 
-def segment_length(samples: int) -> int:
-    """A power of two of which a record has at least 30 half-overlapping ones: what `afmid new pipeline` takes.
-
-    >>> segment_length(100_000), segment_length(10)
-    (4096, 32)
-    """
-    least = max(samples // 16, 64)
-    return min(1 << (least - 1).bit_length(), 2 * LARGEST_SEGMENT) // 2
-
-
 def welch(
     y: Any,
     *,
@@ -108,7 +97,8 @@ def welch(
     units : str or sequence of str, optional
         Unit of all channels, or of each.
     segment_samples : int, optional
-        Samples of a segment, even. By default a power of two of which the shortest record has at least 30.
+        Samples of a segment, even. By default a power of two: that of `afmid new pipeline`, in which a resonance of the
+        shortest record is eight bins wide, at least four in it; where it has none at least 30.
 
     Returns
     -------
@@ -152,7 +142,7 @@ def averaged(
     rows = _records(y, axes)
     of_each = [[row] for row in rows] if axes == "channels" else [rows]
     named = names(channels, units, len(of_each), "channel")
-    length = segment_samples if segment_samples is not None else segment_length(min(map(len, rows)))
+    length = segment_samples if segment_samples is not None else _native.segment_samples(min(rows, key=len))
     found, said = [], []
     for records, (name, unit) in zip(of_each, named, strict=True):
         recording = _native.recording([[record] for record in records], [(name, unit or "1")], rate_hz)
