@@ -11,7 +11,7 @@ use super::levenberg_marquardt::{Limits, minimise};
 use super::predictor::Problem;
 use super::state::State;
 use super::whitening::Whitened;
-use crate::model::{ModelError, coordinates, roots, section_order};
+use crate::model::{ModelError, coordinates, go_on, roots, section_order};
 use crate::optimise::Ending;
 
 /// Iterations for each, at most: enough to tell basins apart.
@@ -43,8 +43,9 @@ impl<'a, 'b> Evaluation<'a, 'b> {
         Self { problem, known: None }
     }
 
-    /// Errors: no finite prediction errors there.
+    /// Errors: no finite prediction errors there; ended from outside.
     fn state(&mut self, point: Point) -> Result<State, ModelError> {
+        go_on(&self.problem.watch)?;
         let signals = match self.known.take() {
             Some(known) => State::whitened(self.problem, &point, known),
             None => State::whitening(self.problem, &point),
