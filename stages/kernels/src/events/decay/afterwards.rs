@@ -21,23 +21,27 @@ const HIGHER: (f64, f64) = (2.25, 2.5e-3);
 ///
 /// # Method
 /// The strongest oscillation, `frequency` in cycles per sample, by its complex amplitude in two stretches before, which
-/// foretell it by their ratio, and one after; or the energy of the second differences, which the modes above it have.
-pub(super) fn is_another(channels: &[&[f64]], instant: usize, frequency: f64) -> bool {
+/// foretell it by their ratio, and one after; where the ringing, which begins at `since`, has one stretch before alone,
+/// by its growth. Or the energy of the second differences, which the modes above it have.
+pub(super) fn is_another(channels: &[&[f64]], since: usize, instant: usize, frequency: f64) -> bool {
     let length = (STRETCH_PERIODS / frequency.max(1e-12)).round() as usize;
     let period = length as f64 / STRETCH_PERIODS;
     let (after, before) = ((CONTACT_PERIODS.0 * period) as usize, (CONTACT_PERIODS.1 * period).ceil() as usize);
-    let Some(first) = instant.checked_sub(before + 2 * length) else { return true };
-    let (second, third) = (first + length, instant + after);
+    let Some(second) = instant.checked_sub(before + length).filter(|second| *second >= since) else { return true };
+    let (first, third) = (second.checked_sub(length).filter(|first| *first >= since), instant + after);
     channels.iter().filter(|y| third + length <= y.len()).any(|y| {
         let amplitude = |from: usize| amplitude(y, from..from + length, frequency);
-        let (one, two, three) = (amplitude(first), amplitude(second), amplitude(third));
+        let (one, two, three) = (first.map(amplitude), amplitude(second), amplitude(third));
         let stretches = (third - second) as f64 / length as f64;
-        let foretold = two * ((two / one).ln() * stretches).exp();
+        let foretold = one.map(|one| two * ((two / one).ln() * stretches).exp());
         let energy = |from: usize| energy(&y[from..from + length]);
         let ((_, higher_before), (all, higher)) = (energy(second), energy(third));
-        let change = three / foretold;
+        let change = three / foretold.unwrap_or(two);
         let shifted = (change.norm() - 1.0).abs() < SHIFTED.0 && change.arg().abs() < SHIFTED.1;
-        let another = (change - 1.0).norm() > ANOTHER && !shifted;
+        let another = match foretold {
+            Some(_) => (change - 1.0).norm() > ANOTHER && !shifted,
+            None => change.norm() > 1.0 + ANOTHER,
+        };
         another || (higher > HIGHER.0 * higher_before && higher > HIGHER.1 * all)
     })
 }
