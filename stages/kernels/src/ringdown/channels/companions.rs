@@ -17,7 +17,8 @@ pub enum Dropped {
     /// It dies away within three samples: a filter of the recorder or the end of a hit looks the same.
     Brief,
     /// The fit leaves more than noise round it, and with errors that count that its damping is not above zero at the
-    /// 0.1 % level: what another mode lacks, or a mode of which nothing is known.
+    /// 0.1 % level: what another mode lacks, or a mode of which nothing is known. Or it turns less than once in the decays
+    /// that it is seen in.
     Undetermined,
     /// It lies within the line of another mode, has its shape and dies away twice as fast or faster: what that mode's
     /// motion leaves.
@@ -77,11 +78,22 @@ pub(super) fn steady(fit: &ChannelRingdown, duration_s: f64) -> Vec<usize> {
     (0..fit.poles.len()).filter(|&j| rate(j) * duration_s < 1.0 && !dies(j)).collect()
 }
 
-/// Modes of whose damping nothing is known, for what the fit leaves round them, by number.
-pub(super) fn undetermined(fit: &ChannelRingdown) -> Vec<usize> {
+/// Modes of whose damping nothing is known, for what the fit leaves round them, or that turn less than once in the decays
+/// that have their energy, by number. `duration_s`: of each decay.
+pub(super) fn undetermined(fit: &ChannelRingdown, duration_s: &[f64]) -> Vec<usize> {
     let error = |j: usize| fit.covariance[(2 * j, 2 * j)].max(0.0).sqrt();
     let known = |j: usize| fit.lack_of_fit[j] <= 1.0 || -fit.poles[j].re > DETERMINED * error(j);
-    (0..fit.poles.len()).filter(|&j| !known(j)).collect()
+    let turns = |j: usize| {
+        let duration = |record: &RecordFit| duration_s.get(record.event).copied().unwrap_or(0.0);
+        let energy = |record: &RecordFit| {
+            let gone = 1.0 - (2.0 * fit.poles[j].re * duration(record)).exp();
+            record.residues[j].norm_sqr() / fit.noise[record.channel].white * gone
+        };
+        let all: f64 = fit.records.iter().map(energy).sum();
+        let seen: f64 = fit.records.iter().map(|record| energy(record) * duration(record)).sum();
+        fit.poles[j].im / std::f64::consts::TAU * seen / all.max(f64::MIN_POSITIVE)
+    };
+    (0..fit.poles.len()).filter(|&j| !known(j) || turns(j) < 1.0).collect()
 }
 
 /// Modes whose response has no maximum, by number.

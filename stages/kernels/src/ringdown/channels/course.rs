@@ -145,7 +145,7 @@ pub fn follow_channels(
         Ok(found) => follow_laws(&records, found, &linear)?,
         Err(error) => oscillations(&records).ok_or(error)?,
     };
-    Ok(found.without_sidebands(&all))
+    Ok(found.without_sidebands(&records))
 }
 
 /// The same of modes that are linear in each part; of the exponentials of `one_line` the strongest alone is a mode.
@@ -187,7 +187,9 @@ fn follow_linear(
         }
         fit = left;
     }
-    let unknown = if fixed { Vec::new() } else { undetermined(&fit) };
+    let duration_s: Vec<f64> =
+        events.iter().map(|rows| rows.first().map_or(0, |row| row.len()) as f64 * interval_s).collect();
+    let unknown = if fixed { Vec::new() } else { undetermined(&fit, &duration_s) };
     if !unknown.is_empty() && unknown.len() < fit.poles.len() {
         let modes = fit.modes();
         dropped.extend(unknown.iter().map(|&j| DroppedMode { mode: modes[j], reason: Dropped::Undetermined }));

@@ -1,7 +1,12 @@
 //! Sidebands of a mode: what a gain or a clock that is disturbed again and again makes of it.
 
+use std::f64::consts::TAU;
+
+use faer::c64;
+
 use super::companions::{Dropped, alike, energies};
 use super::course::nearest;
+use super::laws::LawFit;
 use super::result::{ChannelRingdown, RecordFit};
 use super::rows::Rows;
 use crate::ringdown::channels::FollowedDecay;
@@ -9,24 +14,33 @@ use crate::ringdown::channels::FollowedDecay;
 /// Squared amplitude of a sideband over that of its mode, at most: 15 % of the amplitude.
 const WEAK: f64 = 0.0225;
 /// Share of a sideband's shape that may be none of its mode's. Why: weak lines of three channels that are anywhere have less
-/// in one of twenty-five cases.
-const ORTHOGONAL: f64 = 0.2;
-/// Distance of a line from its place, in the spacing of the sidebands, at most.
-const OFF: f64 = 0.03;
-/// Sidebands of unlike order at least; of one channel, in which all shapes are one, more. Why: of eight lines anywhere four
-/// lie within 0.03 of their places once in a thousand times, and all of one shape far more seldom.
-const LEAST: (usize, usize) = (4, 5);
+/// in one of ten cases; the prediction's failures decide.
+const ORTHOGONAL: f64 = 0.3;
+/// Distance of a line from its place, in the spacing of the sidebands, at most. Why: a mode that moves is nowhere exactly.
+const OFF: f64 = 0.06;
+/// Sidebands of unlike order at least.
+const LEAST_ORDERS: usize = 2;
 /// Orders that the spacing is taken from.
 const ORDERS: [f64; 3] = [1.0, 2.0, 3.0];
-/// Share of the spacing within which the mode's frequency is a multiple of it: a string, of whose modes it is one.
-const MULTIPLE: f64 = 0.1;
+/// Parts of a period into which failures of the prediction are sorted, and neighbours that are taken together.
+const PARTS: (usize, usize) = (8, 2);
+/// Share of the failures' energy in two neighbouring parts from which on a disturbance comes back with the period. Why: of
+/// modes and noise a quarter is there, of a clock that jumps nine tenths.
+const TOGETHER: f64 = 0.6;
+/// Relative error of a spacing: periods are tried so far to either side, in so many steps.
+const PERIOD: (f64, i32) = (0.03, 60);
+/// Least periods of a disturbance in a record that shows it.
+const LEAST_PERIODS: f64 = 6.0;
+/// Times that it acts at least, weighted with energy.
+const LEAST_TIMES: f64 = 3.0;
 
-/// The sidebands of an exponential; none where there are few.
+/// The sidebands of an exponential; none where there are few, or nothing comes back with their spacing.
 ///
 /// # Model
-/// `(1 + sum_n c_n exp(i n d t)) exp(s t)`: lines at equal distances d on either side, weak, of the shape of the mode. The
-/// number of each, and the multiple of d.
-fn sidebands(all: &ChannelRingdown, of: usize) -> Option<Vec<(usize, i32)>> {
+/// `(1 + sum_n c_n exp(i n d t)) exp(s t)`: lines at equal distances d on either side, weak, of the shape of the mode; a
+/// clock or a gain jumps every `2 pi / d`, and there alone the next sample is not foretold by the two before. The number of
+/// each, and the multiple of d.
+fn sidebands(all: &ChannelRingdown, of: usize, records: &LawFit<'_>) -> Option<Vec<(usize, i32)>> {
     let squares = |j: usize| -> f64 {
         all.records
             .iter()
@@ -39,12 +53,7 @@ fn sidebands(all: &ChannelRingdown, of: usize) -> Option<Vec<(usize, i32)>> {
         .filter(|&j| j != of && squares(j) < WEAK * squares(of) && apart(j).abs() > all.poles[j].re.abs())
         .filter(|&j| all.poles[j].im > -all.poles[j].re && alike(all, j, of, ORTHOGONAL))
         .collect();
-    let least = if all.noise.len() > 1 { LEAST.0 } else { LEAST.1 };
     let by_spacing = |spacing: f64| -> Option<Vec<(usize, i32)>> {
-        let own_multiple = carrier.im / spacing;
-        if (own_multiple - own_multiple.round()).abs() < MULTIPLE || own_multiple < 2.0 {
-            return None;
-        }
         let place = |j: usize, apart: f64| {
             let order = (apart / spacing).round();
             let off = (apart - order * spacing).abs();
@@ -54,8 +63,7 @@ fn sidebands(all: &ChannelRingdown, of: usize) -> Option<Vec<(usize, i32)>> {
         let mut orders: Vec<i32> = own.iter().map(|(_, order)| *order).collect();
         orders.sort_unstable();
         orders.dedup();
-        let both = orders.first().is_some_and(|first| *first < 0) && orders.last().is_some_and(|last| *last > 0);
-        if !both || orders.len() < least {
+        if orders.len() < LEAST_ORDERS {
             return None;
         }
         // those below zero hertz are seen above it
@@ -66,17 +74,62 @@ fn sidebands(all: &ChannelRingdown, of: usize) -> Option<Vec<(usize, i32)>> {
         Some(own)
     };
     let spacings = weak.iter().flat_map(|&j| ORDERS.map(|order| apart(j).abs() / order));
-    spacings.filter_map(by_spacing).max_by_key(Vec::len)
+    let mut found: Vec<(f64, Vec<(usize, i32)>)> =
+        spacings.filter_map(|spacing| Some((spacing, by_spacing(spacing)?))).collect();
+    found.sort_by_key(|(_, own)| std::cmp::Reverse(own.len()));
+    found.into_iter().find(|(spacing, _)| comes_back(records, carrier, TAU / spacing)).map(|(_, own)| own)
+}
+
+/// Whether what the pole's recurrence fails to foretell comes back with about this period.
+fn comes_back(records: &LawFit<'_>, pole: c64, period_s: f64) -> bool {
+    let z = (pole * records.interval_s).exp();
+    let longest = records.events.iter().max_by_key(|rows| rows.first().map_or(0, |row| row.len()));
+    let Some(rows) = longest.filter(|rows| rows.first().is_some_and(|row| row.len() > 3)) else { return false };
+    let samples = rows[0].len();
+    if (samples as f64) * records.interval_s < LEAST_PERIODS * period_s {
+        return false;
+    }
+    let failures = |row: &&[f64]| -> Vec<f64> {
+        let mean = row.iter().sum::<f64>() / samples as f64;
+        let missed = |y: &[f64]| y[2] - mean - 2.0 * z.re * (y[1] - mean) + z.norm_sqr() * (y[0] - mean);
+        row.windows(3).map(|y| missed(y).powi(2)).collect()
+    };
+    let is_disturbed = |samples_each: f64, squares: &[f64]| {
+        // energy of each part in each period
+        let count = (squares.len() as f64 / samples_each) as usize + 1;
+        let mut energy = vec![[0.0; PARTS.0]; count];
+        for (k, square) in squares.iter().enumerate() {
+            let periods = k as f64 / samples_each;
+            energy[periods as usize][((periods.fract() * PARTS.0 as f64) as usize).min(PARTS.0 - 1)] += square;
+        }
+        let total: f64 = energy.iter().flatten().sum();
+        (0..PARTS.0).any(|at| {
+            let own = |period: &[f64; PARTS.0]| (0..PARTS.1).map(|next| period[(at + next) % PARTS.0]).sum::<f64>();
+            let together: f64 = energy.iter().map(own).sum();
+            let squared: f64 = energy.iter().map(|period| own(period).powi(2)).sum();
+            // what is strong once is no disturbance that comes back
+            together > TOGETHER * total && together * together > LEAST_TIMES * squared
+        })
+    };
+    let tried = |step: i32| period_s * (1.0 + PERIOD.0 * f64::from(step) / f64::from(PERIOD.1)) / records.interval_s;
+    rows.iter().any(|row| {
+        let squares = failures(row);
+        (-PERIOD.1..=PERIOD.1).any(|step| is_disturbed(tried(step), &squares))
+    })
 }
 
 impl FollowedDecay {
-    /// The same without sidebands of the strongest mode.
-    pub(super) fn without_sidebands(self, all: &ChannelRingdown) -> Self {
+    /// The same without sidebands of any mode, the strongest first.
+    pub(super) fn without_sidebands(self, records: &LawFit<'_>) -> Self {
+        let all = records.all;
         let energy = energies(&self.whole);
-        let Some(of) = (0..energy.len()).max_by(|&a, &b| energy[a].total_cmp(&energy[b])) else { return self };
-        let Some(own) = nearest(&all.poles, self.whole.poles[of]).and_then(|carrier| sidebands(all, carrier)) else {
-            return self;
+        let mut order: Vec<usize> = (0..energy.len()).collect();
+        order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
+        let of_mode = |of: usize| {
+            let carrier = nearest(&all.poles, self.whole.poles[of])?;
+            sidebands(all, carrier, records).map(|own| (of, own))
         };
+        let Some((of, own)) = order.into_iter().find_map(of_mode) else { return self };
         let residuals = self.residuals.clone();
         let mut rows = Rows::of(self, all);
         for (exponential, order) in own {
