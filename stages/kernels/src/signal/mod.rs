@@ -22,7 +22,6 @@ mod decimation;
 mod error;
 mod fourier;
 mod periodogram;
-mod slow;
 mod taper;
 mod welch;
 
@@ -31,6 +30,5 @@ pub use decimation::{Decimated, decimate};
 pub use error::SignalError;
 pub use fourier::{RealTransform, TransformPlans};
 pub use periodogram::{autocorrelation, mean_periodogram, summed_periodograms};
-pub use slow::without_slow;
 pub use taper::{Taper, TaperGains, bessel_i0, hann, taper, taper_gains};
 pub use welch::{AveragedPeriodogram, Detrend, Welch};

@@ -17,9 +17,11 @@ mod gamma;
 mod half_sample_mode;
 mod median;
 mod share;
+mod slow;
 
 pub use beta::{binomial_tail, f_tail, incomplete_beta, student_limit, student_two_sided};
 pub use gamma::{chi_square_level, chi_square_tail, gamma_tail, ln_gamma, normal_two_sided};
 pub use half_sample_mode::half_sample_mode;
 pub use median::{median, median_and_scale};
 pub use share::clopper_pearson;
+pub use slow::without_slow;

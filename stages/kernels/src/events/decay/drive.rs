@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::envelope::Envelope;
-use crate::signal::without_slow;
-use crate::statistics::{median, median_and_scale};
+use crate::statistics::{median, median_and_scale, without_slow};
 
 /// Share of the largest energy from which on a stretch is driven.
 const DRIVEN: f64 = 0.5;

@@ -1,9 +1,9 @@
 //! Blocks of measured input and output, and what is done to them before the transform.
 
-use crate::signal::{hann, without_slow};
+use crate::signal::hann;
 use crate::spectra::SpectrumError;
 use crate::spectra::error::finite;
-use crate::statistics::{median, median_and_scale};
+use crate::statistics::{median, median_and_scale, without_slow};
 
 /// Inputs and outputs over the same samples.
 #[derive(Debug, Clone)]

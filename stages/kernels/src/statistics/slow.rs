@@ -1,6 +1,6 @@
 //! What wanders slower than pulses.
 
-use crate::statistics::median;
+use super::median;
 
 /// Stretches whose medians the wander is drawn through. Why: up to half of a stretch may be pulses.
 const STRETCHES: usize = 32;
