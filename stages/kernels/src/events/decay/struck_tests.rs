@@ -50,7 +50,9 @@ fn a_wrong_sample_is_no_hit() {
     let mut wrong = 0;
     for seed in 0..30 {
         let record = struck(seed, &[1.0], 1.0, 300.0);
-        let at = record.onset[0] + (record.decay_time * (0.3 + 0.02 * seed as f64)) as usize;
+        // the ringing of fewer periods foretells nothing
+        let after = (record.decay_time * (0.3 + 0.02 * seed as f64)).max(6.0 * record.period);
+        let at = record.onset[0] + after as usize;
         let largest = record.channels[0].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
         let mut channels = record.channels.clone();
         channels[0][at] += 0.5 * largest;
@@ -61,8 +63,7 @@ fn a_wrong_sample_is_no_hit() {
             wrong += 1;
         }
     }
-    // in three it comes within four periods of a hit, where nothing is foretold
-    assert!(wrong <= 3, "{wrong} of 30");
+    assert!(wrong <= 2, "{wrong} of 30");
 }
 
 #[test]
