@@ -184,18 +184,22 @@ pub fn is_impulsive(input: &[f64]) -> bool {
     energies().position(enough).is_some_and(|last| few(last + 1))
 }
 
-/// Share of the largest value beyond which a force is a hit's, and samples to either side that are its own: a filter's
-/// answer.
-const OF_A_HIT: (f64, usize) = (0.1, 8);
+/// Share of the largest value, and standard deviations of the noise, beyond both of which a force is a hit's.
+const OF_A_HIT: (f64, f64) = (0.1, 8.0);
+/// Samples to either side that are a hit's own: a filter's answer.
+const BESIDE_SAMPLES: usize = 8;
 
 /// Energy of a force beside its hits, about its median, over that of its hits: noise and drift, which blocks divide by.
 pub fn energy_beside_hits(force: &[f64]) -> f64 {
     let rest = median(&mut force.to_vec());
     let size = |k: &usize| (force[*k] - rest).abs();
-    let largest = (0..force.len()).map(|k| size(&k)).fold(0.0, f64::max);
+    let swings = without_slow(force);
+    let (_, noise) = median_and_scale(&mut swings.clone());
+    let largest = swings.iter().map(|y| y.abs()).fold(0.0, f64::max);
+    let level = (OF_A_HIT.0 * largest).max(OF_A_HIT.1 * noise);
     let mut hit = vec![false; force.len()];
-    for k in (0..force.len()).filter(|k| size(k) > OF_A_HIT.0 * largest) {
-        hit[k.saturating_sub(OF_A_HIT.1)..(k + OF_A_HIT.1 + 1).min(force.len())].fill(true);
+    for k in (0..force.len()).filter(|&k| swings[k].abs() > level) {
+        hit[k.saturating_sub(BESIDE_SAMPLES)..(k + BESIDE_SAMPLES + 1).min(force.len())].fill(true);
     }
     let energy = |inside: bool| (0..force.len()).filter(|k| hit[*k] == inside).map(|k| size(&k).powi(2)).sum::<f64>();
     energy(false) / energy(true).max(f64::MIN_POSITIVE)
