@@ -28,11 +28,11 @@
 //! # Ok::<(), afmid_kernels::events::decay::DecaySearchError>(())
 //! ```
 
-mod afterwards;
 mod backward;
 mod beat;
 #[cfg(test)]
 mod beat_tests;
+mod change;
 mod clipping;
 mod drive;
 mod envelope;

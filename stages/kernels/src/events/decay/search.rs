@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::afterwards::is_another;
+use super::change::ringing_changes;
 use super::clipping::{clipped, touches};
 use super::drive::{bend, ends_of_drive, ends_of_response, hits_of_force};
 use super::envelope::{Envelope, Pitch, without_drift};
@@ -220,7 +220,7 @@ impl<'a> Record<'a> {
             let ringing = (start + apart).min(until)..until;
             let Failures { mut hits, glitches } =
                 hits_into_ringing(&self.channels, &self.steps, &self.clipped, &ringing, self.envelope.period);
-            hits.retain(|&hit| hit + apart < until && is_another(&self.channels, start, hit, self.frequency));
+            hits.retain(|&hit| hit + apart < until && ringing_changes(&self.channels, start, hit, self.frequency));
             let rises = &starts[since + 1..=last];
             let far = |from: &[usize], rise: usize| from.iter().all(|one| one.abs_diff(rise) > apart);
             let placed = |rise: &&usize| far(&hits, **rise) && far(&glitches, **rise);

@@ -10,20 +10,20 @@ const STRETCH_PERIODS: f64 = 2.0;
 const CONTACT_PERIODS: (f64, f64) = (1.0, 0.25);
 /// Change of the strongest oscillation, over what it was to be, that is another hit's. Why: a mode that moves changes by
 /// less within four periods, and a decay of less than that mended by a cut moves no pole by its error.
-const ANOTHER: f64 = 0.15;
+const LEAST_CHANGE: f64 = 0.15;
 /// Change of the amplitude and of the phase, rad, within which the clock may have lost a sample.
 const SHIFTED: (f64, f64) = (0.05, 1.0);
 /// Growth of the second differences' energy, and that energy over the ringing's, that is another hit's: a mode above the
 /// strongest one.
 const HIGHER: (f64, f64) = (2.25, 2.5e-3);
 
-/// Whether the ringing of any channel is another one after `instant`.
+/// Whether the ringing of any channel changes at `instant` by more than it does by itself.
 ///
 /// # Method
 /// The strongest oscillation, `frequency` in cycles per sample, by its complex amplitude in two stretches before, which
 /// foretell it by their ratio, and one after; where the ringing, which begins at `since`, has one stretch before alone,
 /// by its growth. Or the energy of the second differences, which the modes above it have.
-pub(super) fn is_another(channels: &[&[f64]], since: usize, instant: usize, frequency: f64) -> bool {
+pub(super) fn ringing_changes(channels: &[&[f64]], since: usize, instant: usize, frequency: f64) -> bool {
     let length = (STRETCH_PERIODS / frequency.max(1e-12)).round() as usize;
     let period = length as f64 / STRETCH_PERIODS;
     let (after, before) = ((CONTACT_PERIODS.0 * period) as usize, (CONTACT_PERIODS.1 * period).ceil() as usize);
@@ -38,11 +38,11 @@ pub(super) fn is_another(channels: &[&[f64]], since: usize, instant: usize, freq
         let ((_, higher_before), (all, higher)) = (energy(second), energy(third));
         let change = three / foretold.unwrap_or(two);
         let shifted = (change.norm() - 1.0).abs() < SHIFTED.0 && change.arg().abs() < SHIFTED.1;
-        let another = match foretold {
-            Some(_) => (change - 1.0).norm() > ANOTHER && !shifted,
-            None => change.norm() > 1.0 + ANOTHER,
+        let changes = match foretold {
+            Some(_) => (change - 1.0).norm() > LEAST_CHANGE && !shifted,
+            None => change.norm() > 1.0 + LEAST_CHANGE,
         };
-        another || (higher > HIGHER.0 * higher_before && higher > HIGHER.1 * all)
+        changes || (higher > HIGHER.0 * higher_before && higher > HIGHER.1 * all)
     })
 }
 
