@@ -357,6 +357,9 @@ impl Searched {
                     "no larger than stationary noise becomes: {ratio:.1} times the mean energy of its band, of {limit:.0}"
                 ),
                 DismissedReason::Walk => "part of a random walk".to_owned(),
+                DismissedReason::Handling { ratio } => {
+                    format!("a few periods before an event of {ratio:.0} times their energy: what was done to make it")
+                }
                 DismissedReason::Random => "one of many rises and falls of a random vibration".to_owned(),
             };
             Row::refused(record, dismissed.onset, reason)

@@ -126,6 +126,11 @@ pub enum DismissedReason {
     Random,
     /// Part of a random walk.
     Walk,
+    /// A few periods that a far larger event ends: what was done to make it.
+    Handling {
+        /// Its energy over that of those periods.
+        ratio: f64,
+    },
 }
 
 /// A start that was not taken for a decay.
@@ -216,6 +221,7 @@ impl DecaySearch {
                     DismissedReason::Excursion { .. } => "is no larger than stationary noise becomes",
                     DismissedReason::Random => "is one of a random vibration's",
                     DismissedReason::Walk => "is part of a random walk",
+                    DismissedReason::Handling { .. } => "is a few periods before a far larger event",
                 }
             ),
             None => format!("noise alone: no period's rms exceeds {largest:.1} times the noise's"),

@@ -40,6 +40,7 @@ mod error;
 mod excursion;
 mod extent;
 mod found;
+mod handling;
 mod noise_floor;
 #[cfg(test)]
 mod noise_tests;

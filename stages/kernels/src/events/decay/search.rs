@@ -88,6 +88,7 @@ pub fn find_decays(
         since = record.judge(onset, since, next, options, &mut found);
     }
     if matches!(options.trigger, DecayTrigger::LargestRise) {
+        record.dismiss_handling(&mut found);
         record.dismiss_walks(&mut found);
         record.dismiss_excursions(&mut found);
     }
