@@ -5,6 +5,9 @@ use faer::Mat;
 use super::likelihood::{Likelihood, Parameters, Slopes, information};
 use crate::linear_algebra::definite_inverse;
 
+/// Bins from whose scatter an error can be had. Why: of thirty squares the sum is known to a quarter.
+const FEW_BINS: f64 = 30.0;
+
 pub(super) struct Covariances {
     /// Relative standard errors if the model holds.
     pub model: [f64; 5],
@@ -14,7 +17,7 @@ pub(super) struct Covariances {
     pub dispersion: f64,
 }
 
-/// `H^-1 V H^-1`: V from the bins' known correlation (model), or from the misfits themselves (robust).
+/// `H^-1 V H^-1`: V from the bins' known correlation (model), or from the misfits themselves (robust), of few bins the larger.
 pub(super) fn covariances(likelihood: &Likelihood<'_>, parameters: &Parameters, used: &[bool]) -> Covariances {
     let slopes = likelihood.slopes(parameters, used);
     let (square, _) = information(&slopes, parameters.active);
@@ -34,10 +37,24 @@ pub(super) fn covariances(likelihood: &Likelihood<'_>, parameters: &Parameters, 
                 .map(|k| slopes.misfit[k] / (1.0 - leverage(&inverse, &slopes.row[k], parameters.active)).max(0.05))
                 .collect();
             let seen = scores(&slopes, reach, |k, l, _| full[k] * full[l]);
-            (spread(&inverse, &expected, parameters.active), spread(&inverse, &seen, parameters.active))
+            let model = spread(&inverse, &expected, parameters.active);
+            let seen = spread(&inverse, &seen, parameters.active);
+            let bearing = bearing_bins(&inverse, &slopes, parameters.active);
+            let known = |i: usize| if bearing[i] < FEW_BINS && seen[i] < model[i] { model[i] } else { seen[i] };
+            (model, std::array::from_fn(known))
         }
     };
     Covariances { model, robust, bin_correlation: lagged(1) / power, dispersion: averages * power / count }
+}
+
+/// How many bins bear each value: of weights w, `(sum w)^2 / sum w^2`.
+fn bearing_bins(inverse: &Mat<f64>, slopes: &Slopes, active: [bool; 5]) -> [f64; 5] {
+    std::array::from_fn(|i| {
+        let weight =
+            |row: &[f64; 5]| (0..5).filter(|&j| active[j]).map(|j| inverse[(i, j)] * row[j]).sum::<f64>().powi(2);
+        let (sum, squares) = slopes.row.iter().map(weight).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+        sum * sum / squares
+    })
 }
 
 /// Share of a bin in its own fitted value.

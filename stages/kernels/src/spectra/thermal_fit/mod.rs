@@ -73,7 +73,8 @@ pub struct Fitted {
     pub value: f64,
     /// Standard error if the model holds: from the Fisher information and the known correlation of the bins.
     pub std: f64,
-    /// Standard error from the scatter about the model (sandwich), which allows for a wrong number of averages.
+    /// Standard error from the scatter about the model (sandwich), which allows for a wrong number of averages; where few
+    /// bins bear the value, whose scatter says little, at least `std`.
     pub robust_std: f64,
 }
 
