@@ -7,7 +7,7 @@ use crate::ringdown::moving::layout::range;
 use crate::ringdown::moving::model::{MULTIPLES, Mode};
 use crate::ringdown::moving::result::Follows;
 use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit};
-use crate::ringdown::moving::select::{Rules, selected};
+use crate::ringdown::moving::select::{Rules, projected, selected};
 use crate::ringdown::moving::terms::{Law, TERMS, Term, values};
 use faer::c64;
 
@@ -28,6 +28,8 @@ const OF_FREQUENCY: [&[Term]; 3] = [&[Term::Square], &[Term::Square, Term::Fourt
 const DECISIVE: f64 = 10.0;
 /// Gain of BIC from which on a linear mode stands beside one that moves.
 const BESIDE_GAIN: f64 = 60.0;
+/// Where steady lines beside a mode are begun, in its half widths.
+const LINES_ABOUT: [f64; 6] = [-4.0, -2.0, -0.7, 0.7, 2.0, 4.0];
 /// Mean square of what is left in a line's band, in units of noise, from which on it may beat.
 const BEATS: f64 = 3.0;
 /// Trials of a sum of exponentials, and how far above a mode that leaves no more than noise it may be for more of them.
@@ -140,12 +142,16 @@ impl Search<'_> {
             let mode = &best.modes[number];
             let plain = !lacks && is_of_one_cause(mode);
             let other = self.sum_of(&best, line, number, plain);
-            let beside = if left.p_value < UNEXPLAINED { self.beside(&best, line, number) } else { None };
+            // laws of no one cause may stand for a line beside
+            let odd = best.modes[number].moves() && !is_of_one_cause(mode);
+            let unexplained = left.p_value < UNEXPLAINED;
+            let beside = if unexplained || odd { self.beside(&best, line, number) } else { None };
             of_lines[line].bic_difference = other.as_ref().map(|other| own - self.bic(other));
             // as good is not enough where one mode is the plainer account, and enough where it is not
             let wanted = own - if plain { DECISIVE } else { -DECISIVE * f64::from(u8::from(!lacks)) };
             let good = |fit: &Fit| self.bic(fit) < wanted;
-            let beside = beside.filter(|fit| self.bic(fit) < own - BESIDE_GAIN);
+            let gain = if unexplained { BESIDE_GAIN } else { DECISIVE };
+            let beside = beside.filter(|fit| self.bic(fit) < own - gain);
             let other = other.filter(good);
             let sum_is_better = match (&other, &beside) {
                 (Some(a), Some(b)) => self.bic(a) <= self.bic(b) + DECISIVE,
@@ -163,16 +169,18 @@ impl Search<'_> {
         best
     }
 
-    /// The mode with a linear one in its line: steady, or with a pole of the linear fit.
+    /// The mode with a linear one in its line: steady, or with a pole of the linear fit. Where a steady line stands beside
+    /// a mode of one cause, the laws that stood for both are no start: plain ones are, with steady lines about the mode.
     fn beside(&self, best: &Fit, line: usize, number: usize) -> Option<Fit> {
         let mode = &best.modes[number];
         let longest = self.problem.data.hits.iter().map(|hit| hit.duration_s).fold(0.0, f64::max);
         let low = mode.frequency.at(&values(0.05 * range(mode).1, mode.floor).value);
         let given = self.lines[line].poles.iter().map(|p| (p.rate_per_s.max(0.0), p.turn_rad_per_s - mode.turn));
-        let with = |pole: Pole| {
+        let with = |best: &Fit, pole: Pole| {
             if self.problem.is_spent() {
                 return None;
             }
+            let mode = &best.modes[number];
             let unit = Mode {
                 damping: Law::constant(pole.0.max(LEAST_DECAY / longest)),
                 frequency: Law::constant(pole.1),
@@ -185,7 +193,24 @@ impl Search<'_> {
             Some(selected(&self.problem, begin, &self.rules, 3))
         };
         let starts = std::iter::once((0.0, low)).chain(given);
-        starts.take(3).filter_map(with).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
+        let from_laws = starts.take(3).filter_map(|pole| with(best, pole));
+        let plain = if is_of_one_cause(mode) { None } else { self.plainly(best, number) };
+        let rate = mode.damping.at(&values(0.5 * range(mode).1, mode.floor).value).max(LEAST_DECAY / longest);
+        let from_plain = plain.iter().flat_map(|plain| {
+            let centre = plain.modes[number].frequency.at(&values(0.5 * range(mode).1, mode.floor).value);
+            LINES_ABOUT.map(|widths| with(plain, (0.0, centre + widths * rate)))
+        });
+        from_laws.chain(from_plain.flatten()).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
+    }
+
+    /// The fit with the plainest laws that move in one mode: drag and a cubic spring.
+    fn plainly(&self, best: &Fit, number: usize) -> Option<Fit> {
+        let mode = &best.modes[number];
+        let law = |old: &Law, term: Term| projected(old, Law::constant(0.0).with(term), mode);
+        let (damping, frequency) = (law(&mode.damping, Term::Linear)?, law(&mode.frequency, Term::Square)?);
+        let mut modes = best.modes.clone();
+        modes[number] = Mode { damping, frequency, ..mode.clone() };
+        fit(&self.problem, modes)
     }
 
     /// The best sum of exponentials in place of a mode. Where the mode leaves noise alone with terms of a common cause

@@ -312,7 +312,7 @@ fn backward(problem: &dyn Problem, start: Fit, least: Gains) -> Fit {
 const CERTAIN: f64 = 10.0;
 
 /// A law with other terms that is nearest to `old` where the mode has its energy.
-fn projected(old: &Law, new: Law, mode: &Mode) -> Option<Law> {
+pub fn projected(old: &Law, new: Law, mode: &Mode) -> Option<Law> {
     let count = new.terms.len();
     let mut gram = Square::zeros(count);
     let mut right = vec![0.0; count];
