@@ -97,6 +97,8 @@ def diagnose(
     without: Sequence[str] = (),
     most_causes: int = 8,
     false_alarm_rate: float = 0.01,
+    least_gain: float | None = None,
+    tolerated_misfit: float | None = None,
     senses: str | None = None,
 ) -> Diagnosis:
     """Says what a linear model gets wrong in free decays, or in a measured input and output; names the causes, extends
@@ -126,6 +128,12 @@ def diagnose(
         Most causes.
     false_alarm_rate : float
         Rate of false alarms over all candidates together.
+    least_gain : float, optional
+        Least share of the error that a cause has to take away; by default the stage's. Some per cent on long measured
+        records, in which everything is significant.
+    tolerated_misfit : float, optional
+        Share of systematic misfit in what is left, as ratio of root mean squares, up to which causes are named; by
+        default the stage's. More on measured records whose noise is far below any model.
     senses : {"deflection", "rate", "acceleration"}, optional
         What the output senses of the motion, where its unit does not say it.
 
@@ -161,6 +169,8 @@ def diagnose(
         "without": list(without),
         "most_causes": most_causes,
         "false_alarm_rate": false_alarm_rate,
+        "least_gain": least_gain,
+        "tolerated_misfit": tolerated_misfit,
         "senses": senses,
     }
     made, more = artifacts.run_stage(STAGE, inputs, **params)
