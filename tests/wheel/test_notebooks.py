@@ -4,7 +4,7 @@ import json
 import os
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -21,7 +21,7 @@ def code_cells(path):
 @pytest.fixture
 def run(monkeypatch, tmp_path):
     """Runs the cells of a notebook in an empty folder; what they have defined."""
-    matplotlib.use("Agg")
+    plt.switch_backend("agg")
     monkeypatch.setenv("AFMID_CACHE", str(tmp_path / "cache"))
 
     def of(name):
@@ -32,7 +32,7 @@ def run(monkeypatch, tmp_path):
         return defined
 
     yield of
-    matplotlib.pyplot.close("all")
+    plt.close("all")
 
 
 def test_they_are_small_have_no_outputs_and_are_all_run_here():
