@@ -23,9 +23,9 @@ python "$root/tests/wheel/readme_lines.py" "$root/python/afmid/README.md" ringdo
 python lines.py
 afmid --version
 echo "== tests and examples"
-python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest
+python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest -r "$root/tests/wheel/checks.txt"
 python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
-examples=(arrays_at_hand artifacts decays densities diagnoses identification numbers pairs rational reading response_modes
-    responses running smoothed thermal)
+examples=(arrays_at_hand artifacts decays densities diagnoses estimate identification numbers pairs rational reading
+    response_modes responses running smoothed thermal)
 examples=("${examples[@]/#/afmid.}")
 python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

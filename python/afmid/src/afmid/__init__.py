@@ -13,10 +13,11 @@ Results of the program (`afmid run CONFIG -o a.h5`) are opened by `afmid.open`.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
+# type checkers take it for true; the module `typing` takes longer to import than all else here
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from .decays import Ringdown, ringdown
     from .densities import PowerDensity, welch
     from .diagnoses import Diagnosis, diagnose
@@ -119,12 +120,17 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module 'afmid' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:
+    # type checkers read the imports above, and find misspelt names
+
+    def __getattr__(name: str) -> Any:
+        import importlib
+
+        if name not in _MODULE_OF:
+            raise AttributeError(f"module 'afmid' has no attribute {name!r}")
+        value = getattr(importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

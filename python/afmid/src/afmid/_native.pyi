@@ -1,9 +1,33 @@
 """The native module: stages on arrays at hand, readers, the program."""
 
-from typing import Any
+from typing import Any, TypeAlias, final
 
-from .response import Array
+import numpy as np
+import numpy.typing as npt
 
+__all__ = [
+    "Artifact",
+    "artifact",
+    "decays",
+    "density",
+    "frf",
+    "inspect",
+    "main",
+    "page",
+    "pair",
+    "read",
+    "recording",
+    "run_stage",
+    "segment_samples",
+    "stage_parameters",
+    "stages_of",
+    "transfer",
+]
+
+_Real: TypeAlias = npt.NDArray[np.float64]
+_Complex: TypeAlias = npt.NDArray[np.complex128]
+
+@final
 class Artifact:
     """What a stage takes and hands on."""
 
@@ -12,25 +36,25 @@ class Artifact:
     def content(self) -> dict[str, Any]: ...
 
 def recording(
-    records: list[list[Array]], channels: list[tuple[str, str]], sample_rate_hz: float
+    records: list[list[_Real]], channels: list[tuple[str, str]], sample_rate_hz: float
 ) -> Artifact: ...
-def decays(hits: list[list[Array]], channels: list[tuple[str, str]], sample_rate_hz: float) -> Artifact: ...
+def decays(hits: list[list[_Real]], channels: list[tuple[str, str]], sample_rate_hz: float) -> Artifact: ...
 def pair(
-    records: list[tuple[list[Array], list[Array]]],
+    records: list[tuple[list[_Real], list[_Real]]],
     input_names: list[tuple[str, str]],
     output_names: list[tuple[str, str]],
     sample_rate_hz: float,
     params: str,
 ) -> tuple[Artifact, list[str]]: ...
 def frf(
-    frequency_hz: Array,
-    responses: list[tuple[str, Array, Array | None, Array | None, tuple[str, str] | None]],
+    frequency_hz: _Real,
+    responses: list[tuple[str, _Complex, _Real | None, _Real | None, tuple[str, str] | None]],
     added_decay_per_s: float,
     params: str,
 ) -> tuple[Artifact, list[str]]: ...
-def density(frequency_hz: Array, density: Array, params: str) -> tuple[Artifact, list[str]]: ...
-def transfer(frequency_hz: Array, transfer: Array, variance: Array, sample_rate_hz: float) -> Artifact: ...
-def segment_samples(values: Array) -> int: ...
+def density(frequency_hz: _Real, density: _Real, params: str) -> tuple[Artifact, list[str]]: ...
+def transfer(frequency_hz: _Real, transfer: _Complex, variance: _Real, sample_rate_hz: float) -> Artifact: ...
+def segment_samples(values: _Real) -> int: ...
 def artifact(shape: str, content: dict[str, Any]) -> Artifact: ...
 def page(name: str, uses: str, params: str, ports: list[tuple[str, Artifact]], warnings: list[str]) -> str: ...
 def run_stage(

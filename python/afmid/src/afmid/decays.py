@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -12,22 +12,19 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import names, rate, records
 from .errors import DataError
-from .numbers import MODE_HEADS, html_table, mode_rows, text_table
+from .estimate import ModalEstimate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ringdown:
-    """Modes of free decays, as `afmid.ringdown` returns them."""
+class Ringdown(ModalEstimate):
+    """Modes of free decays, as `afmid.ringdown` returns them.
 
-    modes: pd.DataFrame
-    """A row per mode, ascending: `frequency_hz`, `frequency_std_hz`, `quality_factor`, `quality_factor_std`,
-    `damping_ratio`, `damping_ratio_std`, `lack_of_fit` (1: noise alone is left round the mode).
+    `details`: numbers of modes that were tried, exponentials that are no modes and why, noise of each channel, ...
     """
-    shapes: xr.Dataset
-    """Complex mode shapes over mode and channel with their errors, and the modal assurance criterion."""
+
     hits: pd.DataFrame
     """Amplitude and phase of each mode in each hit."""
     course: pd.DataFrame
@@ -36,26 +33,6 @@ class Ringdown:
     """The largest hit as measured, as fitted, and what is left, over channel and time."""
     events: pd.DataFrame | None
     """Where decays were found, and what was refused; None where they were given."""
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Numbers of modes that were tried, exponentials that are no modes and why, noise of each channel, ..."""
-
-    def mac(self) -> pd.DataFrame:
-        """Modal assurance criterion between the shapes, 1 on the diagonal."""
-        found = self.shapes["mac"]
-        numbers = range(1, found.shape[0] + 1)
-        return pd.DataFrame(found.values, index=pd.Index(numbers, name="mode"), columns=list(numbers))
-
-    def summary(self) -> str:
-        """The table of modes with standard errors in brackets, and what is not alright, as text."""
-        return "\n".join([text_table(MODE_HEADS, mode_rows(self.modes)), *(f"warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(MODE_HEADS, mode_rows(self.modes), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Measured, fitted and what is left of the largest hit, a row of axes per channel. Needs matplotlib."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -12,30 +12,34 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import names, rate, real
 from .errors import DataError
-from .numbers import html_table, text_table
+from .estimate import Estimate
 from .response import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEADS = ("channel", "bins", "width (Hz)", "averages", "root mean square", "unit", "largest at (Hz)")
 STORED = ("density", "standard_error", "record_error")
 """The variables of the artifact."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PowerDensity:
-    """One-sided power spectral density, as `afmid.welch` returns it."""
+class PowerDensity(Estimate):
+    """One-sided power spectral density, as `afmid.welch` returns it.
+
+    Printed: bins, averages, root mean square and highest bin of each channel.
+
+    `details`: segments, degrees of freedom, bandwidth, mean square; of several channels by the channel's name.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = (
+        *("channel", "bins", "width (Hz)", "averages", "root mean square", "unit", "largest at (Hz)"),
+    )
 
     density: xr.Dataset
     """Over frequency, and over channel where there are several: `density` with its `standard_error` if the noise is
     stationary, and `record_error`, the same from the scatter of the records. `attrs["averages"]`: as many independent
     spectra were averaged.
     """
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Segments, degrees of freedom, bandwidth, mean square; of several channels by the channel's name."""
 
     def _channels(self) -> list[tuple[str, xr.Dataset]]:
         if "channel" not in self.density.dims:
@@ -52,16 +56,6 @@ class PowerDensity:
             numbers = [f"{width_hz:.6g}", f"{one.attrs['averages']:.1f}", f"{np.sqrt(np.sum(density) * width_hz):.4g}"]
             rows.append([name, str(len(frequency)), *numbers, str(one.attrs["signal_unit"]), f"{at:.6g}"])
         return rows
-
-    def summary(self) -> str:
-        """Bins, averages, root mean square and highest bin of each channel, and what is not alright, as text."""
-        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(HEADS, self._rows(), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """The density with two standard errors on either side. Needs matplotlib."""

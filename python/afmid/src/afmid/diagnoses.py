@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 import xarray as xr
@@ -14,19 +14,26 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import rate
 from .decays import free_decays
-from .numbers import html_table, text_table, with_error
+from .estimate import Estimate
+from .numbers import with_error
 from .pairs import pair_of_one_output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STAGE = "diagnosis.causes"
-HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis:
-    """What a linear model gets wrong, as `afmid.diagnose` returns it."""
+class Diagnosis(Estimate):
+    """What a linear model gets wrong, as `afmid.diagnose` returns it.
+
+    Printed: verdict, causes with their parameters and gains.
+
+    `details`: baseline, evidence, what else was tried: the document that `afmid show` prints.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
 
     verdict: str
     """`clean`, `named` or `unexplained`."""
@@ -42,10 +49,6 @@ class Diagnosis:
     """Measured, and simulated before and after the extension."""
     errors: xr.Dataset
     """Errors by frequency and by the output's size."""
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
     made: dict[str, Any] = field(default_factory=dict)
     """What the stage was given and has handed on, for the page."""
 
@@ -66,26 +69,18 @@ class Diagnosis:
         text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings))
         Path(path).write_text(text, encoding="utf-8")
 
+    def _title(self) -> str:
+        return self.verdict
+
     def _rows(self) -> list[list[str]]:
         rows = []
-        for parameter in self.parameters.itertuples():
-            gain = self.gains[self.gains.cause == parameter.cause]
+        for parameter in self.parameters.to_dict("records"):
+            gain = self.gains[self.gains.cause == parameter["cause"]]
             before, after = (f"{gain[name].iloc[0]:.4g}" if len(gain) else "-" for name in ("rms_before", "rms_after"))
-            value = with_error(float(parameter.value), float(parameter.std))
-            rows.append([str(parameter.cause), str(parameter.parameter), value, str(parameter.unit), before, after])
+            value = with_error(float(parameter["value"]), float(parameter["std"]))
+            texts = [str(parameter[name]) for name in ("cause", "parameter", "unit")]
+            rows.append([*texts[:2], value, texts[2], before, after])
         return rows
-
-    def summary(self) -> str:
-        """Verdict, causes with their parameters and gains, and what is not alright, as text."""
-        said = [f"warning: {text}" for text in self.warnings]
-        table = [text_table(HEADS, self._rows())] if len(self.parameters) else []
-        return "\n".join([self.verdict, *table, *said])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return f"<p>{self.verdict}</p>" + html_table(HEADS, self._rows(), self.warnings)
 
 
 def diagnose(
@@ -102,6 +97,8 @@ def diagnose(
     without: Sequence[str] = (),
     most_causes: int = 8,
     false_alarm_rate: float = 0.01,
+    least_gain: float | None = None,
+    tolerated_misfit: float | None = None,
     senses: str | None = None,
 ) -> Diagnosis:
     """Says what a linear model gets wrong in free decays, or in a measured input and output; names the causes, extends
@@ -131,6 +128,12 @@ def diagnose(
         Most causes.
     false_alarm_rate : float
         Rate of false alarms over all candidates together.
+    least_gain : float, optional
+        Least share of the error that a cause has to take away; by default the stage's. Some per cent on long measured
+        records, in which everything is significant.
+    tolerated_misfit : float, optional
+        Share of systematic misfit in what is left, as ratio of root mean squares, up to which causes are named; by
+        default the stage's. More on measured records whose noise is far below any model.
     senses : {"deflection", "rate", "acceleration"}, optional
         What the output senses of the motion, where its unit does not say it.
 
@@ -166,6 +169,8 @@ def diagnose(
         "without": list(without),
         "most_causes": most_causes,
         "false_alarm_rate": false_alarm_rate,
+        "least_gain": least_gain,
+        "tolerated_misfit": tolerated_misfit,
         "senses": senses,
     }
     made, more = artifacts.run_stage(STAGE, inputs, **params)

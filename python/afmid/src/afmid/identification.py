@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 import xarray as xr
 
 from . import artifacts
+from .estimate import Estimate
 from .model import Model
-from .numbers import MODE_HEADS, html_table, mode_rows, text_table
+from .numbers import MODE_HEADS, mode_rows
 from .pairs import pair_of_one_output
 
 if TYPE_CHECKING:
@@ -19,8 +20,16 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class IdentifiedModel(Model):
-    """A model with its modes, as `afmid.pem`, `afmid.subspace` and `afmid.vector_fitting` return it."""
+class IdentifiedModel(Estimate, Model):
+    """A model with its modes, as `afmid.pem`, `afmid.subspace` and `afmid.vector_fitting` return it.
+
+    Printed: order, fit and modes.
+
+    `details`: convergence, orders that were tried, fits of the data, tests of the residual.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = MODE_HEADS
+    NO_ROWS: ClassVar[str] = "no modes: nothing oscillates"
 
     modes: pd.DataFrame = field(default_factory=pd.DataFrame)
     """A row per resonance, ascending, with standard errors."""
@@ -28,23 +37,13 @@ class IdentifiedModel(Model):
     """All poles and zeros, and what each is."""
     residuals: xr.Dataset = field(default_factory=xr.Dataset)
     """Prediction errors and predictions over time; none of a model that `afmid.pem` has not fitted."""
-    warnings: tuple[str, ...] = ()
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Convergence, orders that were tried, fits of the data, tests of the residual."""
 
-    def summary(self) -> str:
-        """Order, fit and the table of modes with standard errors in brackets, and what is not alright, as text."""
+    def _title(self) -> str:
         fit = self.details.get("simulation_fit_percent")
-        head = f"order {self.order}" + (f", simulation fits {fit:.2f} % of the data" if fit is not None else "")
-        table = text_table(MODE_HEADS, mode_rows(self.modes)) if len(self.modes) else "no modes: nothing oscillates"
-        return "\n".join([head, table, *(f"warning: {text}" for text in self.warnings)])
+        return f"order {self.order}" + (f", simulation fits {fit:.2f} % of the data" if fit is not None else "")
 
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return f"<p>order {self.order}</p>" + html_table(MODE_HEADS, mode_rows(self.modes), self.warnings)
+    def _rows(self) -> list[list[str]]:
+        return mode_rows(self.modes)
 
     def bode(self, frequency_hz: Any = None, figure: Figure | None = None) -> Figure:
         """Magnitude and phase with their 95 % bands, from the first input. Needs matplotlib."""

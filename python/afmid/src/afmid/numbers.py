@@ -36,12 +36,18 @@ MODE_HEADS = ("mode", "frequency (Hz)", "Q", "damping (%)")
 
 def mode_rows(modes: pd.DataFrame) -> list[list[str]]:
     """A table of modes as text, under `MODE_HEADS`."""
-    rows = []
-    for number, mode in enumerate(modes.itertuples(), 1):
-        damping = with_error(100 * mode.damping_ratio, 100 * mode.damping_ratio_std)
-        quality = with_error(mode.quality_factor, mode.quality_factor_std)
-        rows.append([str(number), with_error(mode.frequency_hz, mode.frequency_std_hz), quality, damping])
-    return rows
+
+    def column(value: str, std: str, scale: float = 1.0) -> list[str]:
+        pairs = zip(modes[value].tolist(), modes[std].tolist(), strict=True)
+        return [with_error(scale * of, scale * error) for of, error in pairs]
+
+    columns = (
+        map(str, range(1, len(modes) + 1)),
+        column("frequency_hz", "frequency_std_hz"),
+        column("quality_factor", "quality_factor_std"),
+        column("damping_ratio", "damping_ratio_std", 100),
+    )
+    return [list(row) for row in zip(*columns, strict=True)]
 
 
 def text_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

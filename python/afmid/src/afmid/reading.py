@@ -87,6 +87,12 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
     Returns
     -------
     dict
+        Format, channels with their units, lengths and sample rates in hertz; `error` of a file that cannot be read.
+
+    Raises
+    ------
+    TypeError
+        `path` is none.
 
     Examples
     --------

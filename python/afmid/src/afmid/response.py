@@ -30,12 +30,38 @@ def frequency_response(
 ) -> xr.Dataset:
     """`G = C (z I - A)^-1 B + D` at `z = exp(i 2 pi f Ts)`, from one input to one output, with its band.
 
-    `frequency_hz`: where; 2000 points, logarithmic from 1/5000 of the sample rate to half of it, by default.
-    `intersample`: what the input does between samples: `held` takes the hold's half sample of lag and its droop out, as
-    `model.modes` and `spectrum.etfe` do by default, `sampled` is G itself. Standard errors are those of the delta
-    method with the model's covariance; the magnitude's interval of probability `level` is log-normal, as in
-    `model.modes`; the phase is unwrapped, in radians. Without a covariance, errors and intervals are NaN.
+    Standard errors are those of the delta method with the model's covariance; the magnitude's interval is log-normal,
+    as in `model.modes`. Without a covariance, errors and intervals are NaN.
 
+    Parameters
+    ----------
+    model : Model
+        The model: of a result, or what `afmid.pem` returned.
+    frequency_hz : array_like, optional
+        Where; by default 2000 points, logarithmic from 1/5000 of the sample rate to half of it.
+    input, output : int
+        Which input and which output, from 0.
+    level : float
+        Probability of the magnitude's interval.
+    intersample : {"held", "sampled"}
+        What the input does between samples: "held" takes the hold's half sample of lag and its droop out, as
+        `model.modes` and `spectrum.etfe` do by default, "sampled" is G itself.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over frequency: `transfer`, `magnitude` with `magnitude_std`, `magnitude_low` and `magnitude_high`, in units of
+        output over input; `phase`, unwrapped, and `phase_std`, in radians.
+
+    Raises
+    ------
+    UnknownName
+        Another `intersample`.
+    ValueError
+        A level that is no probability.
+
+    Examples
+    --------
     >>> import afmid
     >>> model = afmid.open("a.h5").model("model")
     >>> band = afmid.frequency_response(model, [1e4], level=0.99)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import complex_values, names, real
 from .errors import ConfigError, DataError
-from .numbers import MODE_HEADS, html_table, mode_rows, text_table
+from .estimate import ModalEstimate
 from .response import Array
 from .responses import MeasuredFrf, artifact
 
@@ -22,43 +22,17 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrfModes:
-    """Modes of frequency responses, as `afmid.frf_modes` returns them."""
+class FrfModes(ModalEstimate):
+    """Modes of frequency responses, as `afmid.frf_modes` returns them.
 
-    modes: pd.DataFrame
-    """A row per mode, ascending: `frequency_hz`, `frequency_std_hz`, `quality_factor`, `quality_factor_std`,
-    `damping_ratio`, `damping_ratio_std`, `lack_of_fit` (1: noise alone is left round the mode).
+    A channel of the shapes is a response's point that goes from response to response.
+    `details`: modes with shapes at unit modal mass where there is a driving point, numbers of modes that were tried...
     """
-    shapes: xr.Dataset
-    """Complex mode shapes over mode and channel with their errors, and the modal assurance criterion. A channel is a
-    response's point that goes from response to response.
-    """
+
     diagram: pd.DataFrame
     """Poles of every order, and whether they are stable: the stabilisation diagram."""
     fit: xr.Dataset
     """Responses as `measured` and as `fitted` over channel and frequency; all at once, the mode `indicator`."""
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Modes with shapes at unit modal mass where there is a driving point, numbers of modes that were tried, ..."""
-
-    def mac(self) -> pd.DataFrame:
-        """Modal assurance criterion between the shapes, 1 on the diagonal."""
-        found = self.shapes["mac"]
-        numbers = range(1, found.shape[0] + 1)
-        return pd.DataFrame(found.values, index=pd.Index(numbers, name="mode"), columns=list(numbers))
-
-    def summary(self) -> str:
-        """The table of modes with standard errors in brackets, and what is not alright, as text."""
-        return "\n".join(
-            [text_table(MODE_HEADS, mode_rows(self.modes)), *(f"warning: {text}" for text in self.warnings)]
-        )
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(MODE_HEADS, mode_rows(self.modes), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Magnitudes of all responses as measured and as fitted, and the mode indicator. Needs matplotlib."""

@@ -4,37 +4,42 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray as xr
 
 from . import artifacts
-from .numbers import html_table, text_table, with_error
+from .estimate import Estimate
+from .numbers import with_error
 from .pairs import pair
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEADS = ("response", "from (Hz)", "to (Hz)", "largest at (Hz)", "magnitude", "unit", "coherence")
 STORED = ("frf", "variance", "coherence", "input_noise")
 """The variables of the artifact; all others follow from them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MeasuredFrf:
-    """Measured frequency responses, as `afmid.frf` returns them."""
+class MeasuredFrf(Estimate):
+    """Measured frequency responses, as `afmid.frf` returns them.
+
+    Printed: band, largest value with its standard error and median coherence of each.
+
+    `details`: number of blocks, width of a bin, the excited band of each input, median coherence, windows.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = (
+        *("response", "from (Hz)", "to (Hz)", "largest at (Hz)", "magnitude", "unit", "coherence"),
+    )
 
     response: xr.Dataset
     """Over response and frequency: `frf`, the complex response, with `std`, the standard error of the complex value;
     `magnitude` and `phase` with `magnitude_std` and `phase_std`; `variance`, `coherence` and `input_noise` as the stage
     hands them on. A response's name is its output and input; both are coordinates of their own, too.
     """
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Number of blocks, width of a bin, the excited band of each input, median coherence, windows."""
     blocks: str = "segments"
     """What was averaged."""
 
@@ -45,16 +50,6 @@ class MeasuredFrf:
 
     def _rows(self) -> list[list[str]]:
         return [_row(self.response.isel(response=k)) for k in range(self.response.sizes["response"])]
-
-    def summary(self) -> str:
-        """Band, largest value with its standard error, median coherence of each response; and what is not alright."""
-        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(HEADS, self._rows(), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Magnitude with two standard errors on either side, phase and coherence of each response. Needs matplotlib."""

@@ -255,11 +255,31 @@ class Result:
 
 
 def open(path: str | os.PathLike[str], *, require_seal: bool = True) -> Result:
-    """Opens a result file of `afmid run`. Errors: `FileNotFoundError`; `NotAResult`; `OtherFormat`.
+    """Opens a result file of `afmid run`.
 
-    `require_seal`: whether to refuse a file without the line that seals it, as the program does; another program that
-    had it open for writing has taken it off.
+    Parameters
+    ----------
+    path : path
+        The file.
+    require_seal : bool
+        Whether to refuse a file without the line that seals it, as the program does; another program that had it open
+        for writing has taken it off.
 
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    NotAResult
+        A file of another kind, or a damaged one.
+    OtherFormat
+        A result of a format that this reader does not know.
+
+    Examples
+    --------
     >>> import afmid
     >>> with afmid.open("a.h5") as r:
     ...     frequencies = r.modes.frequency_hz

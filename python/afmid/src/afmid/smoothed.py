@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -12,21 +12,28 @@ import xarray as xr
 from . import artifacts
 from .arrays_at_hand import rate
 from .errors import DataError
-from .numbers import html_table, text_table, with_error
+from .estimate import Estimate
+from .numbers import with_error
 from .pairs import pair_of_one_output
 from .responses import with_errors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEADS = ("response", "bins", "to (Hz)", "largest at (Hz)", "magnitude", "misfit")
 STORED = ("transfer", "variance", "half_width_bins", "misfit")
 """The variables of the artifact; all others follow from them."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SmoothedResponse:
-    """A frequency response smoothed by local models, as `afmid.smoothing` returns it."""
+class SmoothedResponse(Estimate):
+    """A frequency response smoothed by local models, as `afmid.smoothing` returns it.
+
+    Printed: bins and largest value of estimate and smoothed response.
+
+    `details`: of the estimate, what is defined, and the quasi-static gain.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = ("response", "bins", "to (Hz)", "largest at (Hz)", "magnitude", "misfit")
 
     response: xr.Dataset
     """Over frequency: `transfer`, the complex response, with `std`, the standard error of the complex value,
@@ -35,23 +42,9 @@ class SmoothedResponse:
     """
     etfe: xr.Dataset
     """The estimate that was smoothed, the ratio of the transforms, likewise."""
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Of the estimate: what is defined, and the quasi-static gain."""
 
     def _rows(self) -> list[list[str]]:
         return [_row(name, found) for name, found in (("etfe", self.etfe), ("smoothed", self.response))]
-
-    def summary(self) -> str:
-        """Bins and largest value of estimate and smoothed response, and what is not alright, as text."""
-        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(HEADS, self._rows(), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Magnitude and phase of both, the smoothed magnitude with two standard errors. Needs matplotlib."""

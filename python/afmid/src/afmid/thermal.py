@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -14,18 +14,23 @@ from . import _native, artifacts
 from .arrays_at_hand import rate, real
 from .densities import PowerDensity, artifact, averaged
 from .errors import ConfigError, DataError
-from .numbers import html_table, text_table, with_error
+from .estimate import Estimate
+from .numbers import with_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEADS = ("quantity", "value", "unit")
 FITTED = ("frequency", "quality_factor", "variance", "white", "flicker_at_1_hz")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ThermalFit:
-    """A resonance that noise drives, white and 1/f noise beside it, as `afmid.thermal_fit` returns them."""
+class ThermalFit(Estimate):
+    """A resonance that noise drives, white and 1/f noise beside it, as `afmid.thermal_fit` returns them.
+
+    `details`: the same numbers with peak density, dispersion, window, gain of 1/f noise: what `afmid show` prints.
+    """
+
+    HEADS: ClassVar[tuple[str, ...]] = ("quantity", "value", "unit")
 
     modes: pd.DataFrame
     """One row: `frequency_hz`, `frequency_std_hz`, `quality_factor`, `quality_factor_std`, `damping_ratio`,
@@ -39,24 +44,10 @@ class ThermalFit:
     """`density`, the fitted `model` as the window sees it, and their `ratio` over the frequencies of the fit."""
     lines: pd.DataFrame
     """Lines that were set aside."""
-    warnings: tuple[str, ...]
-    """What is not alright, in the program's words."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """The same numbers with peak density, dispersion, window, gain of 1/f noise: what `afmid show` prints."""
 
     def _rows(self) -> list[list[str]]:
         numbers = [(str(name), of) for name, of in self.parameters.iterrows()]
         return [[name, with_error(float(of.value), float(of["std"])), str(of.unit)] for name, of in numbers]
-
-    def summary(self) -> str:
-        """The fitted quantities with standard errors in brackets, and what is not alright, as text."""
-        return "\n".join([text_table(HEADS, self._rows()), *(f"warning: {text}" for text in self.warnings)])
-
-    def __repr__(self) -> str:
-        return self.summary()
-
-    def _repr_html_(self) -> str:
-        return html_table(HEADS, self._rows(), self.warnings)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """Density and fit, and their ratio. Needs matplotlib."""
