@@ -11,6 +11,7 @@ mod inspect;
 mod page;
 mod program;
 mod read;
+mod simulate;
 mod stage;
 mod watch;
 
@@ -33,6 +34,8 @@ mod native {
     use crate::program::main;
     #[pymodule_export]
     use crate::read::read;
+    #[pymodule_export]
+    use crate::simulate::simulate;
     #[pymodule_export]
     use crate::stage::{run_stage, stage_parameters, stages_of};
 }

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .decays import Ringdown, ringdown
     from .densities import PowerDensity, welch
+    from .diagnosed_model import DiagnosedModel
     from .diagnoses import Diagnosis, diagnose
     from .errors import (
         AfmidError,
@@ -50,6 +51,7 @@ __version__ = "0.2.0"
 _PLACES = {
     "decays": ("Ringdown", "ringdown"),
     "densities": ("PowerDensity", "welch"),
+    "diagnosed_model": ("DiagnosedModel",),
     "diagnoses": ("Diagnosis", "diagnose"),
     "errors": (
         "AfmidError",
@@ -84,6 +86,7 @@ __all__ = [
     "ConfigError",
     "Damaged",
     "DataError",
+    "DiagnosedModel",
     "Diagnosis",
     "FrfModes",
     "IdentifiedModel",

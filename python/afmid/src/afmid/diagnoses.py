@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import rate
 from .decays import free_decays
+from .diagnosed_model import DiagnosedModel
+from .errors import DataError
 from .numbers import html_table, text_table, with_error
 from .pairs import pair_of_one_output
 
@@ -48,6 +51,26 @@ class Diagnosis:
     """Baseline, evidence, what else was tried: the document that `afmid show` prints."""
     made: dict[str, Any] = field(default_factory=dict)
     """What the stage was given and has handed on, for the page."""
+
+    @property
+    def model(self) -> DiagnosedModel:
+        """The extended model, to simulate other inputs with; the linear baseline where nothing was named.
+
+        Errors: `DataError`, a diagnosis without one.
+
+        >>> import numpy as np, afmid
+        >>> time = np.arange(6000) / 1e4
+        >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(6000)
+        >>> found = afmid.diagnose(np.exp(-12 * time) * np.cos(1571 * time) + noise, sample_rate_hz=1e4, begin=0)
+        >>> found.model.sections.frequency_hz.round().tolist(), found.model.simulate(samples=3).round(1).tolist()
+        ([250.0], [1.0, 1.0, 1.0])
+        """
+        content = json.loads(self.made["ports"]["model"][1]["json"])
+        if content is None:
+            help = "diagnose one input and output, or decays"
+            raise DataError("this diagnosis has no model to simulate with", help=help)
+        interval_s = content["interval_s"] if content["structure"] == "chain" else content["dynamics"]["interval_s"]
+        return DiagnosedModel(self.causes, self.parameters, 1 / interval_s, content)
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """The output as measured and as simulated without and with the causes, and what either leaves. Needs
