@@ -4,6 +4,7 @@
 
 mod artifact;
 mod at_hand;
+mod cause;
 mod content;
 mod errors;
 mod from_content;
@@ -24,6 +25,8 @@ mod native {
     use crate::artifact::Artifact;
     #[pymodule_export]
     use crate::at_hand::{decays, density, frf, pair, recording, segment_samples, transfer};
+    #[pymodule_export]
+    use crate::cause::{OwnCause, computed};
     #[pymodule_export]
     use crate::from_content::artifact;
     #[pymodule_export]

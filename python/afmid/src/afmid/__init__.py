@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     )
     from .identification import IdentifiedModel, pem, subspace
     from .model import Model
+    from .own_causes import Cause, Parameter, cause
     from .rational import vector_fitting
     from .reading import inspect, read
     from .recording import Recording
@@ -66,6 +67,7 @@ _PLACES = {
     ),
     "identification": ("IdentifiedModel", "pem", "subspace"),
     "model": ("Model",),
+    "own_causes": ("Cause", "Parameter", "cause"),
     "rational": ("vector_fitting",),
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
@@ -83,6 +85,7 @@ _MODULE_OF = {name: module for module, names in _PLACES.items() for name in name
 __all__ = [
     "AfmidError",
     "AfmidWarning",
+    "Cause",
     "ConfigError",
     "Damaged",
     "DataError",
@@ -95,6 +98,7 @@ __all__ = [
     "NoCovariance",
     "NotAResult",
     "OtherFormat",
+    "Parameter",
     "PowerDensity",
     "Recording",
     "Result",
@@ -104,6 +108,7 @@ __all__ = [
     "Stage",
     "ThermalFit",
     "UnknownName",
+    "cause",
     "diagnose",
     "frequency_response",
     "frf",

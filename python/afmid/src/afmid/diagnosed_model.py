@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,9 @@ import pandas as pd
 from . import _native
 from .errors import DataError
 from .response import Array
+
+if TYPE_CHECKING:
+    from .own_causes import Cause
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,6 +34,8 @@ class DiagnosedModel:
     """Samples per second: those of the record."""
     content: dict[str, Any] = field(default_factory=dict)
     """The model as the program stores it; in units of the largest output and input (`output_scale`, `input_scale`)."""
+    own: tuple[Cause, ...] = ()
+    """The causes of one's own that the diagnosis was given."""
 
     @property
     def sections(self) -> pd.DataFrame:
@@ -100,7 +105,7 @@ class DiagnosedModel:
             help = "give the number of samples: samples=1000"
             raise DataError("the model is of free decays and has no input", help=help)
         state = None if x0 is None else np.ascontiguousarray(np.ravel(x0), dtype=np.float64)
-        channels = _native.simulate(json.dumps(self.content), given, samples or 0, state)
+        channels = _native.simulate(json.dumps(self.content), given, samples or 0, state, [cause.native for cause in self.own])
         return channels[0] if len(channels) == 1 else np.stack(channels, axis=1)
 
     def __repr__(self) -> str:

@@ -23,6 +23,8 @@ from .pairs import pair_of_one_output
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from .own_causes import Cause
+
 STAGE = "diagnosis.causes"
 HEADS = ("cause", "parameter", "value", "unit", "held-out rms before", "after")
 
@@ -70,7 +72,7 @@ class Diagnosis:
             help = "diagnose one input and output, or decays"
             raise DataError("this diagnosis has no model to simulate with", help=help)
         interval_s = content["interval_s"] if content["structure"] == "chain" else content["dynamics"]["interval_s"]
-        return DiagnosedModel(self.causes, self.parameters, 1 / interval_s, content)
+        return DiagnosedModel(self.causes, self.parameters, 1 / interval_s, content, self.made["causes"])
 
     def plot(self, figure: Figure | None = None) -> Figure:
         """The output as measured and as simulated without and with the causes, and what either leaves. Needs
@@ -86,7 +88,8 @@ class Diagnosis:
         """
         ports = [(port, _native.artifact(*of)) for port, of in self.made["ports"].items()]
         params = artifacts.as_json(self.made["params"])
-        text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings))
+        causes = [cause.native for cause in self.made["causes"]]
+        text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings), causes)
         Path(path).write_text(text, encoding="utf-8")
 
     def _rows(self) -> list[list[str]]:
@@ -126,6 +129,7 @@ def diagnose(
     most_causes: int = 8,
     false_alarm_rate: float = 0.01,
     senses: str | None = None,
+    causes: Sequence[Cause] = (),
 ) -> Diagnosis:
     """Says what a linear model gets wrong in free decays, or in a measured input and output; names the causes, extends
     the model, measures the gain.
@@ -156,6 +160,8 @@ def diagnose(
         Rate of false alarms over all candidates together.
     senses : {"deflection", "rate", "acceleration"}, optional
         What the output senses of the motion, where its unit does not say it.
+    causes : sequence of Cause
+        Causes of one's own, made by `afmid.cause`, that are tried beside those of the catalogue.
 
     Returns
     -------
@@ -167,6 +173,8 @@ def diagnose(
         Data that cannot be used.
     ConfigError
         A parameter that is wrong.
+    Exception
+        What the function of one of the `causes` raises.
 
     Examples
     --------
@@ -185,27 +193,28 @@ def diagnose(
             u, y, sample_rate_hz=rate_hz, remove=remove, input_unit=input_unit, output_unit=output_unit
         )
     params: dict[str, Any] = {
-        "candidates": list(candidates),
+        # causes of one's own are tried whatever is chosen from the catalogue
+        "candidates": [*candidates, *(one.id for one in causes if candidates)],
         "without": list(without),
         "most_causes": most_causes,
         "false_alarm_rate": false_alarm_rate,
         "senses": senses,
     }
-    made, more = artifacts.run_stage(STAGE, inputs, **params)
+    made, more = artifacts.run_stage(STAGE, inputs, causes=[one.native for one in causes], **params)
     said = [*said, *more]
     artifacts.warn(said)
     answer = artifacts.document(made["summary"])
-    causes = answer["causes"]
+    named = answer["causes"]
     parameters = [
         {"cause": cause["id"], "parameter": name, "value": of["value"], "std": of.get("std"), "unit": of.get("unit", "")}
-        for cause in causes
+        for cause in named
         for name, of in cause["parameters"].items()
     ]
-    gains = [{"cause": cause["id"], **cause["gain"]} for cause in causes]
+    gains = [{"cause": cause["id"], **cause["gain"]} for cause in named]
     columns = ["id", "class", "p_value", "next_measurement"]
     return Diagnosis(
         verdict=answer["verdict"],
-        causes=pd.DataFrame([{name: cause.get(name) for name in columns} for cause in causes], columns=columns),
+        causes=pd.DataFrame([{name: cause.get(name) for name in columns} for cause in named], columns=columns),
         parameters=pd.DataFrame(parameters, columns=["cause", "parameter", "value", "std", "unit"]),
         gains=pd.DataFrame(gains, columns=["cause", "rms_before", "rms_after", "unit", "held_out"]),
         ladder=artifacts.table(made["ladder"]),
@@ -213,5 +222,9 @@ def diagnose(
         errors=artifacts.array(made["errors"]),
         warnings=tuple(said),
         details=answer,
-        made={"params": params, "ports": {port: (one.shape, one.content()) for port, one in made.items()}},
+        made={
+            "params": params,
+            "ports": {port: (one.shape, one.content()) for port, one in made.items()},
+            "causes": tuple(causes),
+        },
     )
