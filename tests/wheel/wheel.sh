@@ -25,7 +25,7 @@ afmid --version
 echo "== tests and examples"
 python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest
 python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
-examples=(arrays_at_hand artifacts decays densities diagnosed_model diagnoses formula identification numbers own_causes pairs rational reading response_modes
-    responses running smoothed thermal)
+examples=(arrays_at_hand artifacts decays densities diagnosed_model diagnoses formula identification numbers own_causes
+    own_stages pairs rational reading response_modes responses running smoothed thermal)
 examples=("${examples[@]/#/afmid.}")
 python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

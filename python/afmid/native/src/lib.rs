@@ -12,6 +12,7 @@ mod inspect;
 mod page;
 mod program;
 mod read;
+mod run_config;
 mod simulate;
 mod stage;
 mod watch;
@@ -37,6 +38,8 @@ mod native {
     use crate::program::main;
     #[pymodule_export]
     use crate::read::read;
+    #[pymodule_export]
+    use crate::run_config::run_config;
     #[pymodule_export]
     use crate::simulate::simulate;
     #[pymodule_export]

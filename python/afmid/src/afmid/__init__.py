@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .identification import IdentifiedModel, pem, subspace
     from .model import Model
     from .own_causes import Cause, Parameter, cause
+    from .plugin import serve, stage
     from .rational import vector_fitting
     from .reading import inspect, read
     from .recording import Recording
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from .result import Result, open
     from .running import run
     from .smoothed import SmoothedResponse, smoothing
-    from .stage import Source, Stage
+    from .stage_of_run import Source, Stage
     from .thermal import ThermalFit, thermal_fit
 
 __version__ = "0.2.0"
@@ -68,6 +69,7 @@ _PLACES = {
     "identification": ("IdentifiedModel", "pem", "subspace"),
     "model": ("Model",),
     "own_causes": ("Cause", "Parameter", "cause"),
+    "plugin": ("serve", "stage"),
     "rational": ("vector_fitting",),
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
@@ -77,7 +79,7 @@ _PLACES = {
     "result": ("Result", "open"),
     "running": ("run",),
     "smoothed": ("SmoothedResponse", "smoothing"),
-    "stage": ("Source", "Stage"),
+    "stage_of_run": ("Source", "Stage"),
     "thermal": ("ThermalFit", "thermal_fit"),
 }
 # NumPy, pandas, xarray and h5py take half a second: each is imported with the first name that needs it
@@ -119,7 +121,9 @@ __all__ = [
     "read",
     "ringdown",
     "run",
+    "serve",
     "smoothing",
+    "stage",
     "subspace",
     "thermal_fit",
     "vector_fitting",

@@ -55,6 +55,13 @@ def run_stage(
     base: str = ".",
     causes: list[Cause] = ...,
 ) -> tuple[list[tuple[str, Artifact]], list[str]]: ...
+def run_config(
+    config: str,
+    set: list[str],
+    output: str,
+    cache: str | None,
+    stages: list[tuple[str, list[str], Callable[[str, str], str]]],
+) -> None: ...
 def stage_parameters(name: str) -> str: ...
 def stages_of(config: str) -> list[tuple[str, str]]: ...
 def simulate(
