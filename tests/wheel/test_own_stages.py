@@ -1,7 +1,8 @@
-"""`@afmid.stage`: stages that run in the process beside the same as plugins."""
+"""`@afmid.stage`: stages that run in the process beside the same as plugins; what `afmid new` writes for Python."""
 
 import importlib.util
 import os
+import subprocess
 import sys
 import traceback
 
@@ -119,6 +120,14 @@ def test_a_stage_that_is_not_handed_over_is_refused(both):
 
     with pytest.raises(afmid.ConfigError, match="exec:both"):
         afmid.run("a.toml", stages=[other])
+
+
+def test_the_script_of_a_new_cause_finds_it(afmid_cli, tmp_path):
+    afmid_cli("new", "cause", "end_stop", "--python", cwd=tmp_path)
+    command, folder = [sys.executable, "end_stop.py"], tmp_path / "end_stop"
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("named") and "end-stop" in done.stdout
 
 
 def test_a_new_stage_runs_in_the_process(afmid_cli, tmp_path, monkeypatch):
