@@ -6,8 +6,7 @@
 //! names it, and `causes`, `exam` and `simulate.model` know it like any built-in one: the program is afmid with one
 //! more cause.
 
-use afmid_kernels::effects::{Effects, Passage};
-use afmid_stages::causes::{About, Cause, Identifiable, Need, Parameter, Part, Scene, add};
+use afmid_stages::causes::{About, Cause, Effects, Identifiable, Need, Parameter, Part, Passage, Scene, add};
 use std::process::ExitCode;
 
 /// The signal has another slope on either side of the spot's centre: `y = v + a |v|`.
@@ -30,7 +29,7 @@ const ABOUT: About = About {
     resembles: "quadratic-detector: bends everywhere and not at one place; large events tell the two apart",
     next_measurement: "move the photodiode: the bend moves with the spot's centre",
     identifiable: Identifiable::Shape,
-    source: "any amplifier's data sheet on gain error; docs/causes/output-absolute.md for general systems",
+    source: "any amplifier's data sheet on gain error; `afmid causes output-absolute` for general systems",
 };
 
 impl Cause for UnequalSegments {

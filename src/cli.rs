@@ -17,7 +17,7 @@ mod submit;
 pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
 pub use export::{ExportArgs, ExportFormat, ModelFormat, ShapeFormat};
-pub use new::{Goal, New, NewPipelineArgs, NewStageArgs, RecordsAre};
+pub use new::{Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordsAre};
 pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};

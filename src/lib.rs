@@ -29,7 +29,9 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 
+use afmid_pipeline::graph::Stages;
 use afmid_pipeline::own_command::own_arguments;
+use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{InputFiles, Registry, RunResult};
 use clap::FromArgMatches;
@@ -82,6 +84,19 @@ pub fn inspect_json(path: &Path) -> String {
 /// The page that `report` writes, of a run that is in no file. Errors: its template does not go through.
 pub fn page(run: &RunResult) -> Result<String, String> {
     report::report(run, &|_| String::new()).map_err(|error| error.to_string())
+}
+
+/// Runs a config in this process with these stages, as `run` does, and writes its result file. Errors: what the command
+/// would say on stderr, and its exit code.
+pub fn run_here(
+    config: &Path,
+    set: &[String],
+    output: &Path,
+    cache: Option<&Path>,
+    stages: &dyn Stages,
+    observer: &dyn Observer,
+) -> Result<(), (String, u8)> {
+    commands::run_here(config, set, output, cache, stages, observer).map_err(Failure::text_and_code)
 }
 
 /// How a program ends whose stages do not make a registry.

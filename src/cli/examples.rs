@@ -55,6 +55,10 @@ faults, submit again: what is finished is not run again.",
         ],
     ),
     help(
+        &["new", "cause"],
+        &["afmid new cause end_stop --python", "afmid new cause uneven_segments --rust --sources ../afmid"],
+    ),
+    help(
         &["new", "pipeline"],
         &[
             "afmid new pipeline archive/2004 -o levers.toml",

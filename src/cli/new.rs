@@ -11,6 +11,8 @@ pub enum New {
     Pipeline(NewPipelineArgs),
     /// Write a folder with a stage of your own, its test and a config that runs it.
     Stage(NewStageArgs),
+    /// Write a folder with a cause of your own for the diagnosis, and recordings that it is hidden and found in.
+    Cause(NewCauseArgs),
 }
 
 /// Which stage, in which language.
@@ -26,6 +28,32 @@ pub struct NewStageArgs {
     /// A crate that adds the stage to a binary of its own; wants --sources.
     #[arg(long, group = "language", requires = "sources")]
     pub rust: bool,
+    /// Where it goes.
+    #[command(flatten)]
+    pub place: NewFolderArgs,
+}
+
+/// Which cause, in which language.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("language").required(true))]
+pub struct NewCauseArgs {
+    /// Its name: lowercase letters and `_`, a letter first; verdicts have `-` for `_`.
+    #[arg(value_name = "NAME", value_parser = cause_name)]
+    pub name: String,
+    /// A function in Python for `afmid.diagnose`.
+    #[arg(long, group = "language")]
+    pub python: bool,
+    /// A crate that adds the cause to a binary of its own; wants --sources.
+    #[arg(long, group = "language", requires = "sources")]
+    pub rust: bool,
+    /// Where it goes.
+    #[command(flatten)]
+    pub place: NewFolderArgs,
+}
+
+/// Where a stage or a cause goes.
+#[derive(Debug, Args)]
+pub struct NewFolderArgs {
     /// A clone of afmid's repository, which the crate depends on.
     #[arg(long, value_name = "FOLDER")]
     pub sources: Option<PathBuf>,
@@ -35,6 +63,13 @@ pub struct NewStageArgs {
     /// What was written, as JSON, alone on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+fn cause_name(text: &str) -> Result<String, String> {
+    match stage_name(text) {
+        Ok(name) if !name.contains(|c: char| c.is_ascii_digit()) => Ok(name),
+        _ => Err("wanted a name of lowercase letters and `_`, a letter first, 40 at most".to_owned()),
+    }
 }
 
 fn stage_name(text: &str) -> Result<String, String> {

@@ -38,6 +38,8 @@ use std::path::Path;
 use afmid_pipeline::Registry;
 use afmid_pipeline::plugin::{AllStages, Plugins};
 
+pub use run::run_here;
+
 use crate::cli::{AllowArgs, Command, GraphFormat};
 use crate::failure::Failure;
 

@@ -7,7 +7,7 @@ use afmid_pipeline::cache::Cache;
 use afmid_pipeline::error::StoreError;
 use afmid_pipeline::files::sweep_folders;
 use afmid_pipeline::graph::Stages;
-use afmid_pipeline::runner::{Failed, Options, RunError, run as run_plan, run_to_file};
+use afmid_pipeline::runner::{Failed, Observer, Options, RunError, run as run_plan, run_to_file};
 use afmid_pipeline::{InputFiles, Plan, RunResult};
 use serde_json::{Value, json};
 
@@ -61,6 +61,32 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     print(&format!("{}: {}\n", shown(&output), summary(&result)))
 }
 
+/// Runs a config in this process with these stages and writes its result file; nothing is printed.
+pub fn run_here(
+    config: &Path,
+    set: &[String],
+    output: &Path,
+    cache: Option<&Path>,
+    stages: &dyn Stages,
+    observer: &dyn Observer,
+) -> Result<(), Failure> {
+    let plan = load(config, set, stages)?;
+    if plan.points().is_some() {
+        let help = Some("take [sweep] out, or run it without stages of one's own".to_owned());
+        return Err(Failure::usage("a config with [sweep] is not run in a process", help));
+    }
+    prepare(output, Target::Result, &inputs(&plan, config))?;
+    let cache = open_cache(cache);
+    let (base, overrides) = (plan.config.base(), &plan.config.overrides[..]);
+    let computation = Computation { base, cache: &cache, fresh: false, jobs: None, overrides };
+    written_folders(&plan);
+    let result = computation.watched(observer, |options| run_to_file(&plan, options, output))?;
+    result.map(drop).map_err(|failed| match failed {
+        Failed::Stages { errors, kept } => stages_failed(&errors, kept),
+        Failed::File(error) => Failure::failed(&error, error.help.clone()),
+    })
+}
+
 /// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for
 /// temporary files is removed.
 pub fn open_cache(folder: Option<&Path>) -> Cache {
@@ -111,6 +137,15 @@ impl Computation<'_> {
     /// Runs `work` on its threads, with progress on stderr. Errors: there are no threads.
     fn run<T: Send>(&self, work: impl FnOnce(&Options<'_>) -> T + Send) -> Result<T, Failure> {
         let (observer, _run) = (observer(), interrupt::Run::begin());
+        self.watched(observer.as_ref(), work)
+    }
+
+    /// The same under another observer.
+    fn watched<T: Send>(
+        &self,
+        observer: &dyn Observer,
+        work: impl FnOnce(&Options<'_>) -> T + Send,
+    ) -> Result<T, Failure> {
         let options = Options {
             base: self.base.to_owned(),
             cache: self.cache,
@@ -118,7 +153,7 @@ impl Computation<'_> {
             fresh: self.fresh,
             program: PROGRAM.to_owned(),
             overrides: self.overrides.to_vec(),
-            observer: observer.as_ref(),
+            observer,
         };
         // 0: as many as there are processors
         let threads = self.jobs.map_or(0, |jobs| usize::from(jobs.get()));

@@ -1,5 +1,6 @@
-//! Beginnings: configs for recordings that were looked at, stages of one's own.
+//! Beginnings: configs for recordings that were looked at, stages and causes of one's own.
 
+mod cause;
 mod channels;
 mod choice;
 mod density;
@@ -17,9 +18,10 @@ mod stage;
 mod stated;
 mod steps;
 
+pub use cause::{python as python_cause, rust as rust_cause};
 pub use choice::choose;
 pub use left_out::left_out;
 pub use measurement::joined_files;
 pub use pipeline::{Wanted, pipeline};
 pub use recordings::look;
-pub use stage::{python, rust};
+pub use stage::{File, python, rust};

@@ -36,22 +36,32 @@ pub fn rust(name: &str, sources: &Path) -> Vec<File> {
     let program = renamed(include_str!("../../examples/new_stage.rs"), name);
     let config = renamed(include_str!("../../examples/new_stage.toml"), name);
     vec![
-        ("Cargo.toml".to_owned(), manifest(name, sources)),
+        ("Cargo.toml".to_owned(), manifest(name, sources, &DEPENDENCIES, &OTHERS)),
         ("src/main.rs".to_owned(), program),
         (format!("{name}.toml"), config),
     ]
 }
 
-fn manifest(name: &str, sources: &Path) -> String {
+/// Crates of the clone that a stage depends on: what for, name, folder.
+const DEPENDENCIES: [(&str, &str, &str); 2] =
+    [("the command line and the built-in stages", "afmid", ""), ("what a stage is", "afmid-pipeline", "pipeline")];
+
+/// The others, line by line.
+const OTHERS: [&str; 4] = [
+    "# parameters and documents",
+    "schemars = \"1.2\"",
+    "serde = { version = \"1\", features = [\"derive\"] }",
+    "serde_json = \"1\"",
+];
+
+/// The manifest of a crate that depends on crates of a clone (what for, name, folder) and on others.
+pub(super) fn manifest(name: &str, sources: &Path, own: &[(&str, &str, &str)], others: &[&str]) -> String {
     let path = |folder: &str| format!("{:?}", sources.join(folder).display().to_string().trim_end_matches('/'));
+    let own = own.iter().map(|(what, name, folder)| format!("# {what}\n{name} = {{ path = {} }}\n", path(folder)));
+    let others = others.iter().map(|line| format!("{line}\n"));
+    let dependencies: String = own.chain(others).collect();
     format!(
-        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\n\
-         # the command line and the built-in stages\nafmid = {{ path = {} }}\n\
-         # what a stage is\nafmid-pipeline = {{ path = {} }}\n\
-         # parameters and documents\nschemars = \"1.2\"\nserde = {{ version = \"1\", features = [\"derive\"] }}\n\
-         serde_json = \"1\"\n",
-        path(""),
-        path("pipeline"),
+        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\n{dependencies}"
     )
 }
 
@@ -61,7 +71,7 @@ fn renamed(text: &str, name: &str) -> String {
 }
 
 /// `my_stage` as a type: `MyStage`.
-fn type_of(name: &str) -> String {
+pub(super) fn type_of(name: &str) -> String {
     let word =
         |word: &str| word.chars().take(1).flat_map(char::to_uppercase).chain(word.chars().skip(1)).collect::<String>();
     name.split('_').map(word).collect()

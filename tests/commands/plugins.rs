@@ -107,6 +107,28 @@ fn a_new_stage_in_rust_is_a_crate_that_cargo_understands() {
 }
 
 #[test]
+fn a_new_cause_is_a_script_or_a_crate() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    // the script itself is run in tests/wheel, with the package that it imports
+    stdout(here, &["new", "cause", "end_stop", "--python", "-o", "script"]);
+    let script = std::fs::read_to_string(here.join("script/end_stop.py")).expect("the script");
+    assert!(script.contains("def end_stop(x, v,"), "{script}");
+    // the program itself is examples/custom_cause.rs, which tests/commands/example.rs runs
+    stdout(here, &["new", "cause", "end_stop", "--rust", "--sources", ROOT]);
+    let metadata = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--format-version", "1", "--offline"])
+        .current_dir(here.join("end_stop"))
+        .output()
+        .expect("cargo starts");
+    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+    let checked = stdout(&here.join("end_stop"), &["check", "end_stop.toml", "--set", "archive.hidden=[]"]);
+    assert!(!checked.contains("error"), "{checked}");
+    let wrong = afmid(here, &["new", "cause", "stop2", "--python"]);
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("lowercase letters"));
+}
+
+#[test]
 fn a_broken_plugin_fails_with_what_is_wrong_and_the_exit_code_says_so() {
     let scratch = tempfile::tempdir().expect("a folder");
     let script = Path::new(ROOT).join("tests/plugins/broken/wrong_length.py").display().to_string();

@@ -19,13 +19,13 @@ done
 pins=(-c "$root/tests/requirements.txt")
 python -m pip install --quiet --disable-pip-version-check "${pins[@]}" "$wheel[plot,scipy,control]"
 echo "== the first lines of the README"
-python "$root/tests/wheel/readme_lines.py" "$root/python/afmid/README.md" ringdown pem frf thermal_fit read >lines.py
+python "$root/tests/wheel/readme_lines.py" "$root/python/afmid/README.md" ringdown pem frf thermal_fit diagnose read >lines.py
 python lines.py
 afmid --version
 echo "== tests and examples"
 python -m pip install --quiet --disable-pip-version-check "${pins[@]}" pytest -r "$root/tests/wheel/checks.txt"
 python -m pytest -q -p no:cacheprovider "$root/tests/wheel"
-examples=(arrays_at_hand artifacts decays densities diagnoses estimate identification numbers pairs rational reading
-    response_modes responses running smoothed thermal)
+examples=(arrays_at_hand artifacts decays densities diagnosed_model diagnoses estimate formula identification numbers own_causes
+    own_stages pairs rational reading response_modes responses running smoothed thermal)
 examples=("${examples[@]/#/afmid.}")
 python -m pytest -q -p no:cacheprovider --doctest-modules --pyargs "${examples[@]}"

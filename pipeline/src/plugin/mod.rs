@@ -24,6 +24,7 @@ mod pool;
 mod process;
 mod row;
 mod schema;
+mod served;
 mod session;
 mod stage;
 
@@ -36,6 +37,7 @@ pub use hearing::hear;
 pub use launch::Launch;
 pub use plugins::{AllStages, Described, Plugins};
 pub use process::{Host, host_main};
+pub use served::{InProcess, Refused, Served};
 
 /// The versions of the protocol that this program speaks.
 const PROTOCOL: std::ops::RangeInclusive<u64> = 1..=1;

@@ -170,6 +170,10 @@ impl Session {
 pub(super) struct Exchange(PathBuf);
 
 impl Exchange {
+    pub(super) fn new(path: PathBuf) -> Self {
+        Self(path)
+    }
+
     pub(super) fn path(&self) -> &Path {
         &self.0
     }

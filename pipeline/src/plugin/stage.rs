@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::describe::Plugin;
 use super::error::PluginError;
 use super::exchange::{Wanted, give, take};
 use super::message::{Made, PortDescription, Progress};
 use super::row::{CONSENT, Row};
-use super::session::Session;
+use super::session::{Exchange, Session};
 use crate::error::StageError;
 use crate::outcome::Ports;
 use crate::recording::InputFiles;
@@ -82,7 +83,7 @@ impl DynStage for PluginStage {
     }
 }
 
-/// One item: inputs into a file, a request, its answer checked. Files are gone when it returns.
+/// One item of a process. Files are gone when it returns.
 pub(super) fn run(
     session: &mut Session,
     row: &Row,
@@ -90,7 +91,21 @@ pub(super) fn run(
     inputs: &Ports,
     cx: &Context,
 ) -> Result<Ports, PluginError> {
-    let (given, made) = session.files();
+    let (files, timeout) = (session.files(), row.candidate.launch.timeout);
+    item(&row.plugin, params, inputs, cx, &files, |request, progress| {
+        session.request("run", request, timeout, progress)
+    })
+}
+
+/// One item: inputs into a file, a request that `ask` has answered, its answer checked.
+pub(super) fn item(
+    plugin: &Plugin,
+    params: &Value,
+    inputs: &Ports,
+    cx: &Context,
+    (given, made): &(Exchange, Exchange),
+    ask: impl FnOnce(&Value, &mut dyn FnMut(Progress)) -> Result<Value, PluginError>,
+) -> Result<Ports, PluginError> {
     let written = give(inputs, given.path()).map_err(|error| {
         PluginError::new(format!("cannot be given its inputs: {error}"), "check TMPDIR and the space on its disk")
             .alive()
@@ -99,7 +114,7 @@ pub(super) fn run(
     let request = json!({
         "parameters": params,
         // JSON numbers are doubles in many languages: 53 bits arrive whole
-        "seed": row.plugin.spec.seeded.then(|| cx.seed() >> 11),
+        "seed": plugin.spec.seeded.then(|| cx.seed() >> 11),
         "base": base,
         "inputs": written,
         "output": made.path(),
@@ -116,10 +131,10 @@ pub(super) fn run(
         (before..done).take(1 << 20).for_each(|_| cx.tick());
         seen = Some(Progress { done, total });
     };
-    let answer = session.request("run", &request, row.candidate.launch.timeout, &mut progress)?;
+    let answer = ask(&request, &mut progress)?;
     // it answered in order: what it made is wrong, and the next item may be right
     let wrong = |what| PluginError::new(what, "mend the plugin; `afmid plugin check` tries it alone").alive();
-    let (outputs, warnings) = outputs(&row.plugin.outputs, answer, made.path()).map_err(wrong)?;
+    let (outputs, warnings) = outputs(&plugin.outputs, answer, made.path()).map_err(wrong)?;
     warnings.into_iter().for_each(|warning| cx.warn(warning));
     Ok(outputs)
 }

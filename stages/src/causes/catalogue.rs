@@ -1,11 +1,20 @@
 //! Causes of others beside the built-in ones.
 
+use std::cell::RefCell;
 use std::sync::{PoisonError, RwLock};
 
 use super::{CATALOGUE, Cause, Identifiable, Scene, within_limits};
 use afmid_kernels::effects::Effects;
 
-static ADDED: RwLock<Vec<(&'static dyn Cause, u32)>> = RwLock::new(Vec::new());
+thread_local! {
+    /// Those of [`with`], for what runs on this thread.
+    static HERE: RefCell<Listed> = const { RefCell::new(Vec::new()) };
+}
+
+/// Causes with their versions.
+type Listed = Vec<(&'static dyn Cause, u32)>;
+
+static ADDED: RwLock<Listed> = RwLock::new(Vec::new());
 
 /// Why a cause was not added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -36,16 +45,47 @@ pub fn add(cause: &'static dyn Cause, version: u32) -> Result<(), CauseError> {
     Ok(())
 }
 
+/// What `work` returns with further causes in the catalogue of this thread, for as long as it takes: others of the same
+/// names may be tried at the same time elsewhere.
+/// # Errors
+/// As [`add`].
+pub fn with<T>(causes: Vec<(&'static dyn Cause, u32)>, work: impl FnOnce() -> T) -> Result<T, CauseError> {
+    let mut known: Vec<&'static str> = catalogue().iter().map(|cause| cause.about().id).collect();
+    for (cause, _) in &causes {
+        let id = cause.about().id;
+        holds(*cause).map_err(|reason| CauseError::Wrong(id, reason))?;
+        if known.contains(&id) {
+            return Err(CauseError::Double(id));
+        }
+        known.push(id);
+    }
+    /// Takes them off again, also where the work panics.
+    struct Until(usize);
+    impl Drop for Until {
+        fn drop(&mut self) {
+            HERE.with_borrow_mut(|here| here.truncate(self.0));
+        }
+    }
+    let _until = Until(HERE.with_borrow(Vec::len));
+    HERE.with_borrow_mut(|here| here.extend(causes));
+    Ok(work())
+}
+
+/// Those that were added to this process or are tried by this thread, in their order.
+fn others() -> Listed {
+    let mut others = ADDED.read().unwrap_or_else(PoisonError::into_inner).clone();
+    HERE.with_borrow(|here| others.extend_from_slice(here));
+    others
+}
+
 /// Every cause: the built-in ones, then those that were added, in their order.
 pub fn catalogue() -> Vec<&'static dyn Cause> {
-    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
-    CATALOGUE.iter().copied().chain(added.iter().map(|(cause, _)| *cause)).collect()
+    CATALOGUE.iter().copied().chain(others().into_iter().map(|(cause, _)| cause)).collect()
 }
 
 /// Those that were added, with their versions: what results depend on beside the program.
 pub fn added() -> Vec<String> {
-    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
-    added.iter().map(|(cause, version)| format!("cause {} {version}", cause.about().id)).collect()
+    others().iter().map(|(cause, version)| format!("cause {} {version}", cause.about().id)).collect()
 }
 
 /// The cause of that id.

@@ -52,6 +52,21 @@ fn causes_of_others_are_checked_before_they_are_added() {
 }
 
 #[test]
+fn causes_of_a_thread_are_gone_afterwards() {
+    let of = |id: &'static str, class: &'static [&'static str]| -> &'static dyn Cause {
+        Box::leak(Box::new(Stranger(About { id, class, ..*find("feedthrough").unwrap().about() })))
+    };
+    let here = || find("of-a-thread").is_some();
+    let cause = of("of-a-thread", &["of-a-thread"]);
+    let elsewhere = || std::thread::scope(|scope| scope.spawn(here).join().unwrap());
+    assert_eq!(with(vec![(cause, 1)], || (here(), elsewhere(), added().len())), Ok((true, false, 1)));
+    assert!(!here());
+    assert_eq!(with(vec![(cause, 1), (cause, 1)], here), Err(CauseError::Double("of-a-thread")));
+    let refused = with(vec![(of("Of A Thread", &["Of A Thread"]), 1)], here);
+    assert!(refused.unwrap_err().to_string().contains("lower-case"));
+}
+
+#[test]
 fn pages_name_every_parameter() {
     for cause in CATALOGUE {
         let text = page(*cause);

@@ -7,10 +7,10 @@ pub use afmid_kernels::causes::{
     About, CATALOGUE, Cause, Identifiable, Need, Parameter, Part, Scene, releases_have, runs_have, within_limits,
 };
 pub use afmid_kernels::effects::{
-    Added, DecayingLoad, Effects, ExtraMode, FrequencyChange, Instant, Intersample, LinearSection, ModalForce, Motion,
-    Passage, RemainingLoad, SignalPath, StaticMap,
+    Added, Binary, DecayingLoad, Effects, ExtraMode, Formula, FrequencyChange, Instant, Intersample, LinearSection,
+    ModalForce, Motion, Operation, Passage, RemainingLoad, SignalPath, StaticMap, Unary,
 };
-pub use catalogue::{CauseError, add, added, catalogue, find};
+pub use catalogue::{CauseError, add, added, catalogue, find, with};
 pub use page::{as_json, index, page};
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::runs::{Lowered, Restored};
 use super::{closed_loop, several_inputs, steady};
 use crate::artifacts::{Decays, Pair};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
-use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Story};
+use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Simulation, Story};
 
 /// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a
 /// controller, or in a steady oscillation: names the causes, extends the model, measures the gain.
@@ -34,7 +34,7 @@ use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Story};
 /// # Shapes
 /// `summary`: the answer as JSON; `ladder` by model; `simulation` over the time of what is learnt from, of the largest
 /// hit where there are several; `errors` by frequency and by the output's size; `judged` by stretches of time of the
-/// parts.
+/// parts; `model`: the extended model, the linear one where nothing is named, with its causes and scales as JSON.
 /// # Units
 /// Those of `pair`, `decays` or `records`; seconds, Hz.
 /// # Accuracy
@@ -149,15 +149,17 @@ const ERRORS: Port<Array> = Port::new(
     "diagnosis-errors",
     "errors over the identification stretch, by frequency and by the output's size",
 );
+const MODEL: Port<Document> =
+    Port::new("model", "diagnosed-model", "the model to simulate other inputs with; null where there is none");
 const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over the time of the parts to judge on");
 
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 6,
+        version: 7,
         summary: "names what a linear model gets wrong: inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
-        outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec()],
+        outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec(), MODEL.spec()],
         source: "J. Schoukens, L. Ljung, IEEE Control Syst. Mag. 39 (2019) 28",
         ..Spec::STORED
     };
@@ -216,7 +218,8 @@ impl Stage for CausesDiagnose {
             .with(&LADDER, ladder(&answer.diagnosis))
             .with(&SIMULATION, answer.simulation)
             .with(&ERRORS, error_array(&answer.story, &answer.unit))
-            .with(&JUDGED, error_table(&answer.story, &answer.unit)))
+            .with(&JUDGED, error_table(&answer.story, &answer.unit))
+            .with(&MODEL, Document::new(&answer.model)?))
     }
 
     fn examples() -> Vec<Example> {
@@ -240,6 +243,8 @@ pub(super) struct Answer {
     pub diagnosis: Diagnosis,
     pub story: Story,
     pub simulation: Array,
+    /// What other inputs are simulated with: of one input and output, and of free decays.
+    pub model: Option<Simulation>,
     /// Unit of the output.
     pub unit: String,
 }

@@ -66,5 +66,5 @@ pub(super) fn answer(stage: &CausesDiagnose, pair: &Pair<'_>) -> Result<Answer, 
     let story = Story::of_series(output, [&found.before, &found.after], 1.0 / rate, &parts);
     let time = (0..samples).map(|k| k as f64 / rate).collect();
     let simulation = simulation(time, &unit, [output.to_vec(), found.before, found.after]);
-    Ok(Answer { diagnosis: found.diagnosis, story, simulation, unit })
+    Ok(Answer { diagnosis: found.diagnosis, story, simulation, model: None, unit })
 }

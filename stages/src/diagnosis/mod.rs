@@ -22,6 +22,7 @@ mod steady;
 pub use afmid_kernels::diagnosis::verdict::{
     DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
+pub use afmid_kernels::diagnosis::{Drive, Simulation, SimulationError};
 pub use causes_stage::{CausesDiagnose, JudgedPart};
 pub use release_stage::ReleaseDiagnose;
 pub use replay_stage::ReleaseReplay;

@@ -141,6 +141,7 @@ impl CausesDiagnose {
         let found = diagnose(&measured.records, measured.interval_s, &options).map_err(StageError::from_error)?;
         Ok(Answer {
             simulation: measured.simulation(&found),
+            model: Some(found.simulation),
             diagnosis: found.diagnosis,
             story: found.story,
             unit: options.output_unit,

@@ -44,6 +44,7 @@ pub(super) fn answer(
         story: Story::of_series(&measured, simulated, 1.0 / rate, &[]),
         simulation: simulation(time, &unit, [measured.clone(), found.simulated.clone(), found.simulated.clone()]),
         diagnosis,
+        model: None,
         unit,
     })
 }

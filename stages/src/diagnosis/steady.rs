@@ -61,6 +61,7 @@ pub(super) fn answer(stage: &CausesDiagnose, recording: &Recording) -> Result<An
         diagnosis: found.diagnosis,
         story,
         simulation: simulation(time, &channel.unit, [cut(output), cut(&before), cut(&after)]),
+        model: None,
         unit: channel.unit.clone(),
     })
 }

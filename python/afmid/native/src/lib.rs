@@ -4,6 +4,7 @@
 
 mod artifact;
 mod at_hand;
+mod cause;
 mod content;
 mod errors;
 mod from_content;
@@ -11,6 +12,8 @@ mod inspect;
 mod page;
 mod program;
 mod read;
+mod run_config;
+mod simulate;
 mod stage;
 mod watch;
 
@@ -24,6 +27,8 @@ mod native {
     #[pymodule_export]
     use crate::at_hand::{decays, density, frf, pair, recording, segment_samples, transfer};
     #[pymodule_export]
+    use crate::cause::{OwnCause, computed};
+    #[pymodule_export]
     use crate::from_content::artifact;
     #[pymodule_export]
     use crate::inspect::inspect;
@@ -33,6 +38,10 @@ mod native {
     use crate::program::main;
     #[pymodule_export]
     use crate::read::read;
+    #[pymodule_export]
+    use crate::run_config::run_config;
+    #[pymodule_export]
+    use crate::simulate::simulate;
     #[pymodule_export]
     use crate::stage::{run_stage, stage_parameters, stages_of};
 }

@@ -4,14 +4,16 @@ use afmid_pipeline::{Ports, RunInfo, RunResult, StageRecord, StageResult};
 use pyo3::prelude::*;
 
 use crate::artifact::Artifact;
+use crate::cause::{OwnCause, with_causes};
 use crate::errors;
-use crate::stage::with_all_params;
+use crate::stage::{listed, with_all_params};
 
 /// What `afmid report` writes of a stage by itself: its name, parameters (JSON), artifacts by port, and what it warned
-/// of.
+/// of; `causes` that a diagnosis was given.
 ///
 /// Errors: no such stage, a parameter that is wrong.
 #[pyfunction]
+#[pyo3(signature = (name, uses, params, ports, warnings, causes = Vec::new()))]
 pub fn page(
     py: Python<'_>,
     name: &str,
@@ -19,8 +21,9 @@ pub fn page(
     params: &str,
     ports: Vec<(String, Py<Artifact>)>,
     warnings: Vec<String>,
+    causes: Vec<Py<OwnCause>>,
 ) -> PyResult<String> {
-    let (version, params) = with_all_params(uses, params)?;
+    let (version, params) = with_causes(&listed(&causes), || with_all_params(uses, params))?;
     let mut outputs = Ports::new();
     for (port, artifact) in &ports {
         outputs.insert(port, artifact.get().0.clone());

@@ -8,6 +8,7 @@ use afmid_pipeline::{Context, DynStage, Entry, Ports, Stage, toml};
 use pyo3::prelude::*;
 
 use crate::artifact::Artifact;
+use crate::cause::{OwnCause, PythonCause, with_causes};
 use crate::errors;
 use crate::watch::watched;
 
@@ -51,11 +52,12 @@ pub fn checked<S: Stage>(params: &str, instead: (&str, serde_json::Value)) -> Py
 }
 
 /// Runs a stage with parameters (JSON; what is not stated has its default) on artifacts by port; returns its artifacts by
-/// port, and its warnings. `base`: the folder of relative paths. Without the interpreter's lock; Ctrl-C ends it.
+/// port, and its warnings. `base`: the folder of relative paths; `causes`: further ones for a diagnosis. Without the
+/// interpreter's lock; Ctrl-C ends it.
 ///
 /// Errors: a parameter that is wrong; as the stage.
 #[pyfunction]
-#[pyo3(signature = (name, inputs, params, seed = 1, base = "."))]
+#[pyo3(signature = (name, inputs, params, seed = 1, base = ".", causes = Vec::new()))]
 pub fn run_stage(
     py: Python<'_>,
     name: &str,
@@ -63,19 +65,29 @@ pub fn run_stage(
     params: &str,
     seed: u64,
     base: &str,
+    causes: Vec<Py<OwnCause>>,
 ) -> PyResult<Outcome> {
-    let stage = parsed(&entry(name)?, serde_json::from_str(params).map_err(errors::config)?)?;
+    let causes = listed(&causes);
+    let params = serde_json::from_str(params).map_err(errors::config)?;
+    let stage = with_causes(&causes, || parsed(&entry(name)?, params))?;
     let mut ports = Ports::new();
     for (port, artifact) in &inputs {
         ports.insert(port, artifact.get().0.clone());
     }
     let (outputs, warnings) = watched(py, |cancel| {
-        let cx = Context::new(Path::new(base), seed, &NoProgress).with_cancel(cancel);
-        let outputs = stage.run(&ports, &cx)?;
-        Ok((outputs, cx.into_warnings()))
+        with_causes(&causes, || {
+            let cx = Context::new(Path::new(base), seed, &NoProgress).with_cancel(cancel);
+            let outputs = stage.run(&ports, &cx).map_err(errors::stage)?;
+            Ok((outputs, cx.into_warnings()))
+        })
     })?;
     let outputs = outputs.iter().map(|(port, artifact)| (port.to_owned(), Artifact(artifact.clone()))).collect();
     Ok((outputs, warnings))
+}
+
+/// What the catalogue takes of causes.
+pub fn listed(causes: &[Py<OwnCause>]) -> Vec<&'static PythonCause> {
+    causes.iter().map(|cause| cause.get().0).collect()
 }
 
 /// All parameters of a stage with their defaults, as JSON. Errors: there is no such stage.

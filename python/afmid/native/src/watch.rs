@@ -3,11 +3,8 @@
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use afmid_pipeline::StageError;
 use afmid_pipeline::stage::Cancel;
 use pyo3::prelude::*;
-
-use crate::errors;
 
 /// How often is looked for a signal.
 const SIGNALS: Duration = Duration::from_millis(50);
@@ -15,7 +12,7 @@ const SIGNALS: Duration = Duration::from_millis(50);
 /// What `work` returns. It runs on a thread of its own, without the interpreter's lock; this one looks for signals.
 ///
 /// Errors: those of `work`; the exception that a signal's handler raised, once the work has ended.
-pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(Cancel) -> Result<T, StageError> + Send) -> PyResult<T> {
+pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(Cancel) -> PyResult<T> + Send) -> PyResult<T> {
     let cancel = Cancel::default();
     let own = cancel.clone();
     let (found, raised) = py.detach(|| {
@@ -40,7 +37,7 @@ pub fn watched<T: Send>(py: Python<'_>, work: impl FnOnce(Cancel) -> Result<T, S
     });
     match (raised, found) {
         (Some(raised), _) => Err(raised),
-        (None, Ok(found)) => found.map_err(errors::stage),
+        (None, Ok(found)) => found,
         (None, Err(panic)) => std::panic::resume_unwind(panic),
     }
 }

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from .decays import Ringdown, ringdown
     from .densities import PowerDensity, welch
+    from .diagnosed_model import DiagnosedModel
     from .diagnoses import Diagnosis, diagnose
     from .errors import (
         AfmidError,
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     )
     from .identification import IdentifiedModel, pem, subspace
     from .model import Model
+    from .own_causes import Cause, Parameter, cause
+    from .plugin import serve, stage
     from .rational import vector_fitting
     from .reading import inspect, read
     from .recording import Recording
@@ -43,7 +46,7 @@ if TYPE_CHECKING:
     from .result import Result, open
     from .running import run
     from .smoothed import SmoothedResponse, smoothing
-    from .stage import Source, Stage
+    from .stage_of_run import Source, Stage
     from .thermal import ThermalFit, thermal_fit
 
 __version__ = "0.2.0"
@@ -51,6 +54,7 @@ __version__ = "0.2.0"
 _PLACES = {
     "decays": ("Ringdown", "ringdown"),
     "densities": ("PowerDensity", "welch"),
+    "diagnosed_model": ("DiagnosedModel",),
     "diagnoses": ("Diagnosis", "diagnose"),
     "errors": (
         "AfmidError",
@@ -65,6 +69,8 @@ _PLACES = {
     ),
     "identification": ("IdentifiedModel", "pem", "subspace"),
     "model": ("Model",),
+    "own_causes": ("Cause", "Parameter", "cause"),
+    "plugin": ("serve", "stage"),
     "rational": ("vector_fitting",),
     "reading": ("inspect", "read"),
     "recording": ("Recording",),
@@ -74,7 +80,7 @@ _PLACES = {
     "result": ("Result", "open"),
     "running": ("run",),
     "smoothed": ("SmoothedResponse", "smoothing"),
-    "stage": ("Source", "Stage"),
+    "stage_of_run": ("Source", "Stage"),
     "thermal": ("ThermalFit", "thermal_fit"),
 }
 # NumPy, pandas, xarray and h5py take half a second: each is imported with the first name that needs it
@@ -82,9 +88,11 @@ _MODULE_OF = {name: module for module, names in _PLACES.items() for name in name
 __all__ = [
     "AfmidError",
     "AfmidWarning",
+    "Cause",
     "ConfigError",
     "Damaged",
     "DataError",
+    "DiagnosedModel",
     "Diagnosis",
     "FrfModes",
     "IdentifiedModel",
@@ -93,6 +101,7 @@ __all__ = [
     "NoCovariance",
     "NotAResult",
     "OtherFormat",
+    "Parameter",
     "PowerDensity",
     "Recording",
     "Result",
@@ -102,6 +111,7 @@ __all__ = [
     "Stage",
     "ThermalFit",
     "UnknownName",
+    "cause",
     "diagnose",
     "frequency_response",
     "frf",
@@ -112,7 +122,9 @@ __all__ = [
     "read",
     "ringdown",
     "run",
+    "serve",
     "smoothing",
+    "stage",
     "subspace",
     "thermal_fit",
     "vector_fitting",

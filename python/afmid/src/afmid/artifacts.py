@@ -16,9 +16,13 @@ from .errors import AfmidWarning
 from .response import Array
 
 
-def run_stage(name: str, inputs: dict[str, Any], seed: int = 1, **params: Any) -> tuple[dict[str, Any], list[str]]:
-    """Runs a stage; its artifacts by port, and its warnings. `None` stands for a parameter's default."""
-    outputs, said = _native.run_stage(name, inputs, as_json(params), seed)
+def run_stage(
+    name: str, inputs: dict[str, Any], seed: int = 1, causes: Sequence[Any] = (), **params: Any
+) -> tuple[dict[str, Any], list[str]]:
+    """Runs a stage; its artifacts by port, and its warnings. `None` stands for a parameter's default; `causes`: further
+    ones for a diagnosis, as the native module has them.
+    """
+    outputs, said = _native.run_stage(name, inputs, as_json(params), seed, causes=list(causes))
     return dict(outputs), list(said)
 
 

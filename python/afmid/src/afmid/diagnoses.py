@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,12 +15,16 @@ import xarray as xr
 from . import _native, artifacts
 from .arrays_at_hand import rate
 from .decays import free_decays
+from .diagnosed_model import DiagnosedModel
+from .errors import DataError
 from .estimate import Estimate
 from .numbers import with_error
 from .pairs import pair_of_one_output
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from .own_causes import Cause
 
 STAGE = "diagnosis.causes"
 
@@ -52,6 +57,26 @@ class Diagnosis(Estimate):
     made: dict[str, Any] = field(default_factory=dict)
     """What the stage was given and has handed on, for the page."""
 
+    @property
+    def model(self) -> DiagnosedModel:
+        """The extended model, to simulate other inputs with; the linear baseline where nothing was named.
+
+        Errors: `DataError`, a diagnosis without one.
+
+        >>> import numpy as np, afmid
+        >>> time = np.arange(6000) / 1e4
+        >>> noise = 1e-3 * np.random.default_rng(1).standard_normal(6000)
+        >>> found = afmid.diagnose(np.exp(-12 * time) * np.cos(1571 * time) + noise, sample_rate_hz=1e4, begin=0)
+        >>> found.model.sections.frequency_hz.round().tolist(), found.model.simulate(samples=3).round(1)[:2].tolist()
+        ([250.0], [1.0, 1.0])
+        """
+        content = json.loads(self.made["ports"]["model"][1]["json"])
+        if content is None:
+            help = "diagnose one input and output, or decays"
+            raise DataError("this diagnosis has no model to simulate with", help=help)
+        interval_s = content["interval_s"] if content["structure"] == "chain" else content["dynamics"]["interval_s"]
+        return DiagnosedModel(self.causes, self.parameters, 1 / interval_s, content, self.made["causes"])
+
     def plot(self, figure: Figure | None = None) -> Figure:
         """The output as measured and as simulated without and with the causes, and what either leaves. Needs
         matplotlib.
@@ -66,7 +91,8 @@ class Diagnosis(Estimate):
         """
         ports = [(port, _native.artifact(*of)) for port, of in self.made["ports"].items()]
         params = artifacts.as_json(self.made["params"])
-        text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings))
+        causes = [cause.native for cause in self.made["causes"]]
+        text = _native.page("diagnosis", STAGE, params, ports, list(self.warnings), causes)
         Path(path).write_text(text, encoding="utf-8")
 
     def _title(self) -> str:
@@ -100,6 +126,7 @@ def diagnose(
     least_gain: float | None = None,
     tolerated_misfit: float | None = None,
     senses: str | None = None,
+    causes: Sequence[Cause] = (),
 ) -> Diagnosis:
     """Says what a linear model gets wrong in free decays, or in a measured input and output; names the causes, extends
     the model, measures the gain.
@@ -136,6 +163,8 @@ def diagnose(
         default the stage's. More on measured records whose noise is far below any model.
     senses : {"deflection", "rate", "acceleration"}, optional
         What the output senses of the motion, where its unit does not say it.
+    causes : sequence of Cause
+        Causes of one's own, made by `afmid.cause`, that are tried beside those of the catalogue.
 
     Returns
     -------
@@ -147,6 +176,8 @@ def diagnose(
         Data that cannot be used.
     ConfigError
         A parameter that is wrong.
+    Exception
+        What the function of one of the `causes` raises.
 
     Examples
     --------
@@ -165,7 +196,8 @@ def diagnose(
             u, y, sample_rate_hz=rate_hz, remove=remove, input_unit=input_unit, output_unit=output_unit
         )
     params: dict[str, Any] = {
-        "candidates": list(candidates),
+        # causes of one's own are tried whatever is chosen from the catalogue
+        "candidates": [*candidates, *(one.id for one in causes if candidates)],
         "without": list(without),
         "most_causes": most_causes,
         "false_alarm_rate": false_alarm_rate,
@@ -173,21 +205,21 @@ def diagnose(
         "tolerated_misfit": tolerated_misfit,
         "senses": senses,
     }
-    made, more = artifacts.run_stage(STAGE, inputs, **params)
+    made, more = artifacts.run_stage(STAGE, inputs, causes=[one.native for one in causes], **params)
     said = [*said, *more]
     artifacts.warn(said)
     answer = artifacts.document(made["summary"])
-    causes = answer["causes"]
+    named = answer["causes"]
     parameters = [
         {"cause": cause["id"], "parameter": name, "value": of["value"], "std": of.get("std"), "unit": of.get("unit", "")}
-        for cause in causes
+        for cause in named
         for name, of in cause["parameters"].items()
     ]
-    gains = [{"cause": cause["id"], **cause["gain"]} for cause in causes]
+    gains = [{"cause": cause["id"], **cause["gain"]} for cause in named]
     columns = ["id", "class", "p_value", "next_measurement"]
     return Diagnosis(
         verdict=answer["verdict"],
-        causes=pd.DataFrame([{name: cause.get(name) for name in columns} for cause in causes], columns=columns),
+        causes=pd.DataFrame([{name: cause.get(name) for name in columns} for cause in named], columns=columns),
         parameters=pd.DataFrame(parameters, columns=["cause", "parameter", "value", "std", "unit"]),
         gains=pd.DataFrame(gains, columns=["cause", "rms_before", "rms_after", "unit", "held_out"]),
         ladder=artifacts.table(made["ladder"]),
@@ -195,5 +227,9 @@ def diagnose(
         errors=artifacts.array(made["errors"]),
         warnings=tuple(said),
         details=answer,
-        made={"params": params, "ports": {port: (one.shape, one.content()) for port, one in made.items()}},
+        made={
+            "params": params,
+            "ports": {port: (one.shape, one.content()) for port, one in made.items()},
+            "causes": tuple(causes),
+        },
     )

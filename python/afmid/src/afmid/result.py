@@ -16,7 +16,7 @@ from . import stored
 from .errors import AfmidError, UnknownName
 from .format import OpenFile
 from .model import Model
-from .stage import Stage
+from .stage_of_run import Stage
 
 
 class Result:

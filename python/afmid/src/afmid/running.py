@@ -14,6 +14,7 @@ from typing import Any
 
 from . import _native
 from .errors import ConfigError, DataError
+from .own_stages import served
 from .result import Result
 from .result import open as open_result
 
@@ -29,8 +30,10 @@ def run(
     output: str | os.PathLike[str] | None = None,
     cache: str | os.PathLike[str] | None = None,
     progress: bool = False,
+    stages: Sequence[Any] = (),
 ) -> Result:
-    """Runs a config as `afmid run` does, in a process of its own, and opens its result.
+    """Runs a config as `afmid run` does, in a process of its own, and opens its result. With stages of one's own it runs
+    in this process.
 
     Parameters
     ----------
@@ -45,7 +48,11 @@ def run(
     cache : path, optional
         The folder of the cache; the program's own by default.
     progress : bool
-        Whether what the program says is shown while it runs.
+        Whether what the program says is shown while it runs; without `stages`.
+    stages : sequence of stages
+        What `exec:NAME` is in the config: functions that `afmid.stage` made stages of, or those of a plugin's script.
+        They run in this process and see its variables; no plugin is started. The numbers are those that `afmid run`
+        gets from the same stage as a plugin.
 
     Returns
     -------
@@ -57,6 +64,8 @@ def run(
         A config that cannot be run, in the program's words.
     DataError
         A stage that failed.
+    Exception
+        What one of the `stages` raised.
 
     Examples
     --------
@@ -72,20 +81,29 @@ def run(
     values = dict(set or {})
     if files is not None:
         values[f"{_loading_stage(Path(config))}.files"] = [os.path.abspath(file) for file in files]
+    said = [f"{name}={json.dumps(value)}" for name, value in values.items()]
+    if stages:
+        own = [served(stage) for stage in stages]
+        _native.run_config(os.fspath(config), said, str(place), None if cache is None else os.fspath(cache), own)
+        return _opened(place, kept)
     command = [sys.executable, "-m", "afmid", "run", os.fspath(config), "-o", os.fspath(place)]
-    for name, value in values.items():
-        command += ["--set", f"{name}={json.dumps(value)}"]
+    for one in said:
+        command += ["--set", one]
     if cache is not None:
         command += ["--cache", os.fspath(cache)]
-    said = []
+    heard = []
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as running:
         for line in running.stderr or ():
-            said.append(line)
+            heard.append(line)
             if progress:
                 print(line, end="", file=sys.stderr, flush=True)
     if running.returncode != 0:
         kind = ConfigError if running.returncode == _USAGE else DataError
-        raise kind("".join(said).strip() or f"afmid run ended with {running.returncode}")
+        raise kind("".join(heard).strip() or f"afmid run ended with {running.returncode}")
+    return _opened(place, kept)
+
+
+def _opened(place: Path, kept: tempfile.TemporaryDirectory[str] | None) -> Result:
     result = open_result(place)
     if kept is not None:
         weakref.finalize(result, kept.cleanup)

@@ -1,6 +1,7 @@
 //! The static curve: a natural cubic spline.
 
 use faer::Mat;
+use serde::{Deserialize, Serialize};
 
 use crate::linear_algebra::solve;
 
@@ -9,7 +10,8 @@ const BEYOND: usize = 2000;
 
 /// A cubic spline on equally spaced knots, given by its values there; straight beyond its ends, where the second
 /// derivative is zero.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Curve {
     first: f64,
     step: f64,

@@ -25,7 +25,8 @@ impl Structure {
 }
 
 /// `y = second(curve(first(u)))`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BlockModel {
     /// From the input to the curve, in units of the input: where it is fitted, its response to the training input has
     /// the input's standard deviation.
@@ -40,6 +41,11 @@ impl BlockModel {
     /// The response to `u`, from rest: as many samples.
     pub fn simulate(&self, u: &[f64]) -> Vec<f64> {
         self.second.filter(&self.intermediate(u).1)
+    }
+
+    /// Whether its parts have the coefficients that belong to them; what was stored may not.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.first.is_whole() && self.second.is_whole() && self.curve.values().len() >= 3
     }
 
     /// The signals before and after the curve.

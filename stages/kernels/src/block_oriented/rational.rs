@@ -1,6 +1,7 @@
 //! A linear part: a chain of sections of order two with a tap behind every state.
 
 use faer::{Mat, c64};
+use serde::{Deserialize, Serialize};
 
 use crate::linear_algebra::{eigenvalues, least_squares};
 use crate::model::{Coefficients, roots, section_order, sections_of_roots};
@@ -11,7 +12,8 @@ use crate::model::{Coefficients, roots, section_order, sections_of_roots};
 /// `G = d + sum_i (b_i1 q^-1 + b_i2 q^-2) / (A_1 ... A_i)` with sections `A_i = 1 + a_i1 q^-1 + a_i2 q^-2`: every
 /// proper transfer function of these poles, repeated ones included, in coefficients of like size. One coefficient of
 /// the numerator is held: the gain belongs to the curve.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Rational {
     order: usize,
     /// `[a1, a2]` each; `a2 = 0` in the last one of an odd order.
@@ -42,6 +44,11 @@ impl Rational {
         let taps = least_squares(&basis, &Mat::from_fn(order + 1, 1, |i, _| wanted[i]), 1e-15).ok()?;
         found.taps = (0..=order).map(|i| taps[(i, 0)]).collect();
         found.taps.iter().all(|tap| tap.is_finite()).then_some(found)
+    }
+
+    /// Whether it has the coefficients of its order.
+    pub(super) fn is_whole(&self) -> bool {
+        self.sections.len() == self.order.div_ceil(2) && self.taps.len() == self.order + 1
     }
 
     /// Number of poles.

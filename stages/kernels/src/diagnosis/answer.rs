@@ -145,9 +145,8 @@ impl Findings<'_> {
                 None => (at(which), at(which + 1)),
             };
             let gain = before.zip(after).and_then(|(b, a)| finite(self.effective(count) * (b / a).ln()));
-            let about = crate::causes::built_in(chosen.id).map(|cause| cause.about());
             NamedCause {
-                id: chosen.id.to_owned(),
+                id: chosen.about.id.to_owned(),
                 class: chosen.class(),
                 p_value: finite(chosen.p_value),
                 parameters: self.parameters(which),
@@ -160,8 +159,8 @@ impl Findings<'_> {
                 },
                 runner_up: chosen
                     .runner_up
-                    .map(|(id, share)| RunnerUp { id: id.to_owned(), share_of_gain: finite(share) }),
-                next_measurement: about.map_or(String::new(), |about| about.next_measurement.to_owned()),
+                    .map(|(rival, share)| RunnerUp { id: rival.id.to_owned(), share_of_gain: finite(share) }),
+                next_measurement: chosen.about.next_measurement.to_owned(),
             }
         };
         self.choice.chosen.iter().filter(|chosen| chosen.has_a_name()).map(one).collect()
@@ -196,13 +195,8 @@ impl Findings<'_> {
         let channel = own.get(modes.first().copied().unwrap_or(0)).copied().unwrap_or(0);
         let y = self.bench.output_scale.get(channel).copied().unwrap_or_else(|| self.scale());
         match unit {
-            "V" => y,
-            "1/V" => 1.0 / y,
-            "1/V^2" => y.powi(-2),
-            "1/V^4" => y.powi(-4),
-            "s/V" => 1.0 / y,
             "input" => self.bench.input_scale,
-            _ => 1.0,
+            unit => y.powi(power_of_output(unit)),
         }
     }
 
@@ -265,9 +259,13 @@ impl Findings<'_> {
     }
 
     fn nearest(&self) -> Vec<RunnerUp> {
-        let chosen = self.choice.chosen.iter().map(|chosen| (chosen.id, None));
-        let rivals =
-            self.choice.chosen.iter().filter_map(|chosen| chosen.runner_up).map(|(id, share)| (id, Some(share)));
+        let chosen = self.choice.chosen.iter().map(|chosen| (chosen.about.id, None));
+        let rivals = self
+            .choice
+            .chosen
+            .iter()
+            .filter_map(|chosen| chosen.runner_up)
+            .map(|(rival, share)| (rival.id, Some(share)));
         let left = self.choice.nearest.iter().map(|(id, share)| (*id, Some(*share)));
         let all: Vec<(&str, Option<f64>)> = chosen.chain(rivals).chain(left).collect();
         let mut nearest: Vec<RunnerUp> = Vec::new();
@@ -317,10 +315,10 @@ impl Findings<'_> {
             })
             .collect();
         for chosen in self.choice.chosen.iter().filter(|chosen| chosen.tied) {
-            let rival = chosen.runner_up.map_or("nothing", |(id, _)| id);
+            let rival = chosen.runner_up.map_or("nothing", |(rival, _)| rival.id);
             lines.push(format!(
                 "{} can't be distinguished from {rival}: their losses differ by less than 4 variances of the noise",
-                chosen.id
+                chosen.about.id
             ));
         }
         let share = 100.0 * self.misfit.share();
@@ -353,6 +351,29 @@ fn scored(part: &Part) -> usize {
     part.stretch.samples().saturating_sub(state)
 }
 
+/// Power of the output's unit in a parameter's: `V`, `V^2`, `1/V`, `s/V`, `1/V^4`.
+fn power_of_output(unit: &str) -> i32 {
+    let of = |text: &str| match text.strip_prefix('V')? {
+        "" => Some(1),
+        power => power.strip_prefix('^')?.parse::<i32>().ok(),
+    };
+    match unit.split_once('/') {
+        Some((above, below)) => of(above).unwrap_or(0) - of(below).unwrap_or(0),
+        None => of(unit).unwrap_or(0),
+    }
+}
+
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power_of_output;
+
+    #[test]
+    fn a_parameter_has_the_outputs_unit_to_a_power() {
+        let units = ["V", "1/V", "1/V^2", "1/V^4", "s/V", "V^3", "1", "Hz", "V/s", "1/Hz", "input"];
+        assert_eq!(units.map(power_of_output), [1, -1, -2, -4, -1, 3, 0, 0, 1, 0, 0]);
+    }
 }

@@ -9,7 +9,7 @@ use super::fit::paired;
 use super::options::DiagnosisOptions;
 use super::verdict::{Diagnosis, Gain, NamedCause, Rung, Validation, Value, Verdict};
 use crate::Unwatched;
-use crate::block_oriented::{BlockFit, BlockOptions, Structure, fit_block_oriented};
+use crate::block_oriented::{BlockFit, BlockModel, BlockOptions, Structure, fit_block_oriented};
 
 /// Fewest samples: some twenty parameters, each with a hundred.
 const LEAST: usize = 2000;
@@ -27,6 +27,8 @@ pub(super) struct Chain {
     pub after: Vec<f64>,
     /// The same from the record's first sample on, to the end of the last part.
     pub whole: Vec<f64>,
+    /// The model itself.
+    pub model: BlockModel,
 }
 
 /// Fits chains of linear parts and one static curve to the first stretch, and writes what is found into an answer that
@@ -93,7 +95,8 @@ pub(super) fn chain(
             validation.rms_after = rms_after;
         }
     }
-    Some(Chain { after: simulated.get(stretch.first..stretch.end)?.to_vec(), whole: simulated })
+    let after = simulated.get(stretch.first..stretch.end)?.to_vec();
+    Some(Chain { after, whole: simulated, model: fit.model })
 }
 
 /// Samples of a part that are scored.

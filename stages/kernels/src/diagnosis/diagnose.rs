@@ -12,6 +12,7 @@ use super::linear_only::{LinearOnly, halves, linear_only};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, trials};
 use super::selection::{Choice, Search};
+use super::simulation::{ModalSimulation, Simulation};
 use super::story::{Story, story};
 use super::unnamed_law::unnamed_law;
 use super::validation::check_part;
@@ -31,10 +32,8 @@ pub struct Diagnosed {
     pub after: Vec<f64>,
     /// What both models miss, for a person to look at.
     pub story: Story,
-    /// The extended model, in units of the largest output and input.
-    pub model: Model,
-    /// Those units: of each channel, of the input.
-    pub scales: (Vec<f64>, f64),
+    /// The model to simulate other inputs with: the extended one where causes are named, else the linear baseline.
+    pub simulation: Simulation,
 }
 
 /// Samples that causes are chosen on; all samples fit what was chosen. Below half as many again all are taken.
@@ -137,11 +136,15 @@ pub fn diagnose(
         values
     };
     let (before, mut after) = (in_units(&choice.ladder[0].fit.simulated), in_units(&last.fit.simulated));
-    let (output, model) = (in_units(&bench.output), last.fit.model.clone());
+    let (output, extended) = (in_units(&bench.output), last.fit.model.clone());
     let findings = Findings { bench: &bench, records, options, blocks, choice, misfit, unnamed, adequate };
     let mut diagnosis = findings.answer();
+    let named = if diagnosis.verdict == Verdict::Named { &extended } else { &linear };
+    let scales = (&bench.output_scale[..], bench.input_scale);
+    let mut simulation = Simulation::Modal(ModalSimulation::new(named, scales, bench.reference_s(), bench.steps()));
     if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
         after = chain.after;
+        simulation = Simulation::Chain { model: chain.model, interval_s };
         story = Story::of_series(&output, [&before, &after], interval_s, &[]).over_parts(
             &bench,
             records,
@@ -163,15 +166,7 @@ pub fn diagnose(
             diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
         }
     }
-    Ok(Diagnosed {
-        diagnosis,
-        output,
-        before,
-        after,
-        story,
-        model,
-        scales: (bench.output_scale.clone(), bench.input_scale),
-    })
+    Ok(Diagnosed { diagnosis, output, before, after, story, simulation })
 }
 
 /// How far a linear model of one input goes, where no model accounts for the data.

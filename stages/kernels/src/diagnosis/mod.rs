@@ -6,7 +6,7 @@
 //! library (general terms, whatever the cause), lack_of_fit (whether they predict what remains), unnamed_law (whether one
 //! of them does more than the names miss), chain (linear parts around a static curve, where no causes
 //! account for the data), linear_only (how far a linear model goes, where none can be extended), validation (parts that
-//! chose nothing), story (what a person looks at), answer.
+//! chose nothing), simulation (of other inputs, with the model that it ends with), story (what a person looks at), answer.
 //!
 //! Three kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
 //! drive depends on its output; a steady oscillation ([`steady`]), which says nothing of a decay but everything of the
@@ -38,6 +38,7 @@ pub mod release;
 mod score_test;
 mod selection;
 mod settled;
+mod simulation;
 pub mod steady;
 mod story;
 #[cfg(test)]
@@ -54,4 +55,5 @@ pub use fit::Fit;
 pub use lack_of_fit::Misfit;
 pub use linear_only::{LinearOnly, halves, linear_only};
 pub use options::DiagnosisOptions;
+pub use simulation::{Drive, ModalSimulation, PlacedCause, Simulation, SimulationError};
 pub use story::{Binned, Spectra, Story};

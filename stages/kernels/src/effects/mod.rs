@@ -1,5 +1,6 @@
 //! What causes change, as parts that add up in one simulation.
 
+mod formula;
 mod passage;
 
 use std::fmt;
@@ -7,6 +8,7 @@ use std::sync::Arc;
 
 use faer::c64;
 
+pub use formula::{Binary, Formula, MOST_OPERATIONS, Operation, Unary};
 pub use passage::{Passage, SignalPath, StaticMap, pass};
 
 /// Motion of the lever at one instant, in volts of static deflection (deflection times sensitivity).

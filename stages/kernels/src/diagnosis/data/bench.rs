@@ -197,6 +197,11 @@ impl Bench {
         starts.map(|first| (power(first), first)).fold((-1.0, 0), larger).1
     }
 
+    /// Steps of the integrator between samples.
+    pub(crate) fn steps(&self) -> usize {
+        self.steps
+    }
+
     /// Length of the longest stretch that is learnt from, s.
     pub(crate) fn reference_s(&self) -> f64 {
         self.reference_s

@@ -1,11 +1,14 @@
 //! Dynamics as a sum of sections: modes, free masses, real poles.
 
+use serde::{Deserialize, Serialize};
+
 use super::model::State;
 use super::section::Section;
 use super::sensed::Sensed;
 
 /// Which weights of the sections in the outputs are estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Weights {
     /// None: one output that senses the sum of the motions.
     Fixed,
@@ -18,7 +21,8 @@ pub enum Weights {
 
 /// `y_c = sum_s w_cs . x_s + through u`, x_s = (deflection, rate / omega) of section s; an accelerometer has `- q'' /
 /// omega^2` in the place of the deflection.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Modal {
     /// Modes first, then real poles.
     pub sections: Vec<Section>,

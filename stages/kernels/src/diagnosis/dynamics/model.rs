@@ -1,12 +1,15 @@
 //! Dynamics with named causes, as a vector of parameters.
 
+use serde::{Deserialize, Serialize};
+
 use super::added::Added;
 use super::modal::Modal;
 use crate::causes::{Cause, Part};
 use crate::effects::Effects;
 
 /// What a stretch has of its own: where its motion begins, where its zero lies.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct State {
     /// Deflection and rate / omega of each section at its first sample.
     pub sections: Vec<[f64; 2]>,

@@ -1,9 +1,11 @@
 //! A part of the dynamics with poles of its own.
 
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// What a section is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// `q'' + (w/Q) q' + w^2 q = w^2 g u`.
     Oscillator,
@@ -14,7 +16,8 @@ pub enum Kind {
 }
 
 /// A section of the dynamics.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Section {
     /// What it is.
     pub kind: Kind,

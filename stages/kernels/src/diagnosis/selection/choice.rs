@@ -1,6 +1,6 @@
 //! What a search found: models, and the causes that were chosen.
 
-use crate::causes::built_in;
+use crate::causes::About;
 use crate::diagnosis::data::Bench;
 use crate::diagnosis::fit::{Blocks, Fit};
 
@@ -26,16 +26,16 @@ impl Judged {
 /// A cause that was chosen, and what it was held against.
 #[derive(Clone)]
 pub(crate) struct Chosen {
-    /// Its id.
-    pub id: &'static str,
+    /// What it is.
+    pub about: &'static About,
     /// Its place among the model's causes.
     pub place: usize,
     /// Corrected for all candidates and their trials.
     pub p_value: f64,
     /// Ratio of the score's scatter between blocks to that of white residuals.
     pub inflation: f64,
-    /// The best model with another cause in its place: id, share of the gain.
-    pub runner_up: Option<(&'static str, f64)>,
+    /// The best model with another cause in its place: which, share of the gain.
+    pub runner_up: Option<(&'static About, f64)>,
     /// Whether the two can't be distinguished.
     pub tied: bool,
     /// Error without it on what did not choose it, all others refitted; none where it is far from the error with it.
@@ -45,14 +45,13 @@ pub(crate) struct Chosen {
 impl Chosen {
     /// Whether the data distinguish it from its rival, or both act in the same place and make its class.
     pub fn has_a_name(&self) -> bool {
-        let part = |id| built_in(id).map(|cause| cause.about().part);
-        !self.tied || self.runner_up.is_some_and(|(rival, _)| part(rival) == part(self.id))
+        !self.tied || self.runner_up.is_some_and(|(rival, _)| rival.part == self.about.part)
     }
 
     /// What these data can't distinguish from it, itself included.
     pub fn class(&self) -> Vec<String> {
-        let own = built_in(self.id).map_or(&[][..], |cause| cause.about().class);
-        let rival = self.runner_up.map(|(id, _)| id).filter(|id| self.tied && !own.contains(id));
+        let own = self.about.class;
+        let rival = self.runner_up.map(|(rival, _)| rival.id).filter(|id| self.tied && !own.contains(id));
         own.iter().copied().chain(rival).map(str::to_owned).collect()
     }
 }

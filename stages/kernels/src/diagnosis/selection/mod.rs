@@ -11,7 +11,7 @@ use super::instants::instant;
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, screen, significance};
-use crate::causes::Cause;
+use crate::causes::{About, Cause};
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
@@ -282,10 +282,10 @@ impl Search<'_> {
                 let mut others = here.fit.model.causes.iter().enumerate().filter(|(other, _)| *other != which);
                 others.any(|(_, other)| other.id() == id)
             };
-            if let Some((rival, id)) =
+            if let Some((rival, about)) =
                 rival.filter(|_| may_change && found.runner_up.is_some_and(|(_, share)| share > ALIKE))
-                && follows(id)
-                && !follows(found.id)
+                && follows(about.id)
+                && !follows(found.about.id)
             {
                 return Examined::Changes(rival.fit.model);
             }
@@ -301,7 +301,7 @@ impl Search<'_> {
     }
 
     /// The best model with another cause in the place of `which`, of another class.
-    fn rival(&self, here: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static str)> {
+    fn rival(&self, here: &Judged, which: usize, without: &Judged) -> Option<(Judged, &'static About)> {
         let about = here.fit.model.causes[which].cause.about();
         let others: Vec<Candidate> = self
             .candidates
@@ -318,9 +318,9 @@ impl Search<'_> {
         rivals.into_iter().find_map(|reached| {
             let rival = self.compared(&reached.model)?;
             let place = rival.fit.model.causes.len() - 1;
-            let id = rival.fit.model.causes[place].id();
+            let about = rival.fit.model.causes[place].cause.about();
             // what is not significant by itself is no rival
-            self.passes(&sample, &rival, place, without).then_some((rival, id))
+            self.passes(&sample, &rival, place, without).then_some((rival, about))
         })
     }
 
@@ -358,20 +358,20 @@ impl Search<'_> {
         here: &Judged,
         which: usize,
         without: &Judged,
-        rival: Option<&(Judged, &'static str)>,
+        rival: Option<&(Judged, &'static About)>,
     ) -> Chosen {
         let added = &here.fit.model.causes[which];
         let gain = without.fit.loss - here.fit.loss;
         let sign = significance(sample, &here.fit.model, which, gain);
         let tie = TIE * sample.floor.mean_square * sign.inflation.max(1.0);
         Chosen {
-            id: added.id(),
+            about: added.cause.about(),
             place: which,
             p_value: self.corrected(sign.p_value, added.cause),
             inflation: sign.inflation,
             tied: rival.is_some_and(|(rival, _)| rival.fit.loss - here.fit.loss < tie),
             left_out: None,
-            runner_up: rival.map(|(rival, id)| (*id, (without.fit.loss - rival.fit.loss) / gain)),
+            runner_up: rival.map(|(rival, about)| (*about, (without.fit.loss - rival.fit.loss) / gain)),
         }
     }
 }

@@ -1,0 +1,1 @@
+../../../afmid_stage/afmid_stage.py
