@@ -17,7 +17,7 @@ pub(super) struct Along<'a> {
 }
 
 impl<'a> Along<'a> {
-    /// `end_s`: the decays' end, later than which no amplitude is reached.
+    /// `end_s`: the decays' end, later than which no amplitude is reached: of laws that hold in a part of them, its end.
     pub fn new(course: &'a AmplitudeCourse, end_s: f64) -> Self {
         let rate = |at: &CoursePoint| TAU * at.frequency_hz.value * at.damping_ratio.value;
         let mut points: Vec<(f64, CoursePoint)> = Vec::new();
@@ -99,6 +99,7 @@ impl<'a> Along<'a> {
             "moves": true,
             "follows": "laws",
             "last_part_counts": false,
+            "share": self.course.share,
             "along": self.points.iter().map(at).collect::<Vec<Value>>(),
             "amplitude_unit": laws.unit,
             "decay_rate_per_s": law(&laws.damping_terms),
@@ -112,7 +113,7 @@ impl<'a> Along<'a> {
         };
         format!(
             "mode {} moves with its amplitude: {} Hz and a damping ratio of {} % at {:.3e}, {} Hz and {} % at {:.3e} \
-             ({end:.4} s later), as {} and {}: the table has the values at the smallest amplitude",
+             ({end:.4} s later), as {} and {}: the table has the values at the smallest amplitude{}",
             self.course.mode + 1,
             digits(first.frequency_hz, 1.0),
             digits(first.damping_ratio, 100.0),
@@ -122,7 +123,21 @@ impl<'a> Along<'a> {
             last.amplitude,
             law("frequency", &self.course.laws.frequency_terms),
             law("decay rate", &self.course.laws.damping_terms),
+            self.limit(),
         )
+    }
+}
+
+impl Along<'_> {
+    /// How far the laws hold, in words.
+    fn limit(&self) -> String {
+        match self.course.share {
+            share if share < 1.0 => {
+                let percent = (100.0 * share).round();
+                format!(" that the first {percent} % of the decays reach; later it follows none of these laws")
+            }
+            _ => String::new(),
+        }
     }
 }
 

@@ -21,7 +21,12 @@ pub struct AmplitudeCourse {
     pub mode: usize,
     /// Its laws, and its values along the amplitude.
     pub laws: FollowedMode,
+    /// Share of each decay, from its beginning on, within which the laws hold: of what follows them no further.
+    pub share: f64,
 }
+
+/// Shares of the decays, from their beginning on, that laws are tried for where none holds to the end.
+const FIRST_PARTS: [f64; 3] = [0.6, 0.35, 0.2];
 
 /// Half widths (of both together) within which lines are fitted together: what one lacks, the others explain.
 const TOGETHER: f64 = 6.0;
@@ -40,6 +45,12 @@ pub(super) struct OneLine {
     pub main: usize,
     /// All, by number.
     pub own: Vec<usize>,
+}
+
+/// A line that laws hold for up to a share of the decays.
+struct FirstPart {
+    line: FollowedLine,
+    share: f64,
 }
 
 /// Linear modes that may share a line.
@@ -82,10 +93,16 @@ pub(super) fn follow_laws(
     let refuted = records.moving_without_law(&linear, &found);
     let linear = if refuted.is_empty() { linear } else { linear_of(&refuted).unwrap_or(linear) };
     let mut rows = Rows::of(linear, records.all);
-    for line in &refuted {
+    let parts: Vec<Option<FirstPart>> = refuted.iter().map(|line| records.first_part(line)).collect();
+    for (line, _) in refuted.iter().zip(&parts).filter(|(_, part)| part.is_none()) {
         rows.widen_line(&line.own);
     }
     records.rows(&found, &mut rows);
+    for (line, part) in refuted.iter().zip(&parts) {
+        let Some(FirstPart { line: followed, share }) = part else { continue };
+        let tag = law(followed).and_then(|mode| records.row_of_law(followed, mode, &line.own, &mut rows));
+        tag.into_iter().for_each(|tag| rows.holds_in(tag, *share));
+    }
     for course in rows.moving() {
         rows.widen(course.mode, 0.5 * (course.last.pole() - course.first.pole()));
     }
@@ -125,7 +142,7 @@ pub(super) fn oscillations(records: &LawFit<'_>) -> Option<FollowedDecay> {
     (!followed.fit.poles.is_empty()).then_some(followed)
 }
 
-impl LawFit<'_> {
+impl<'a> LawFit<'a> {
     /// Numbers of the exponentials to be looked at, ascending; none where a linear fit holds everywhere.
     fn suspects(&self, linear: &FollowedDecay) -> Vec<usize> {
         let poles = &self.all.poles;
@@ -213,6 +230,19 @@ impl LawFit<'_> {
         refuted
     }
 
+    /// The line in the longest first part of the decays that laws hold in, down to noise.
+    fn first_part(&self, line: &OneLine) -> Option<FirstPart> {
+        FIRST_PARTS.into_iter().find_map(|share| {
+            let cut = |row: &&[f64]| (row.len() as f64 * share) as usize;
+            let part = |rows: &Vec<&'a [f64]>| rows.iter().map(|row| &row[..cut(row)]).collect();
+            let events: Vec<Vec<&[f64]>> = self.events.iter().map(part).collect();
+            let mut found = Lines::of(&LawFit { events: &events, ..*self }, &line.own, &[]).ok()?;
+            let one = if found.fit.lines.len() == 1 { found.fit.lines.pop() } else { None }?;
+            let holds = one.follows == Follows::Moving && law(&one).is_some();
+            holds.then(|| FirstPart { line: widened(one), share })
+        })
+    }
+
     /// What a line is in the table; the tag of its (first) row.
     fn rows_of(&self, line: &FollowedLine, own: &[usize], found: &Moving, rows: &mut Rows<'_>) -> Option<usize> {
         let has_row = rows.of_poles(own);
@@ -265,6 +295,26 @@ impl LawFit<'_> {
         let degrees = 2 + 2 * self.all.records.len();
         gain.is_finite() && chi_square_tail(gain, degrees) * longest as f64 > self.options.false_alarm
     }
+}
+
+/// A line whose laws hold in a first part alone: they are not those of the motion, and each value of a course is known to
+/// half of its distance to the next.
+fn widened(mut line: FollowedLine) -> FollowedLine {
+    for mode in &mut line.modes {
+        let values: Vec<[f64; 2]> =
+            mode.course.iter().map(|at| [at.frequency_hz.value, at.damping_ratio.value]).collect();
+        for (k, at) in mode.course.iter_mut().enumerate() {
+            let next = if k + 1 < values.len() { k + 1 } else { k.saturating_sub(1) };
+            let half = |own: usize| 0.5 * (values[next][own] - values[k][own]);
+            at.frequency_hz.std = at.frequency_hz.std.hypot(half(0));
+            at.damping_ratio.std = at.damping_ratio.std.hypot(half(1));
+        }
+        if let Some(low) = mode.course.first() {
+            mode.frequency_hz = low.frequency_hz;
+            mode.quality_factor.std = mode.quality_factor.value * low.damping_ratio.std / low.damping_ratio.value.abs();
+        }
+    }
+    line
 }
 
 /// Whether a line is about a multiple of another, which may move.

@@ -154,6 +154,59 @@ fn errors_of_a_mode_that_follows_no_law_count_what_it_moves() {
     }
 }
 
+/// A decay from 1 of a spring that does nothing within `gap` to either side.
+fn decay_with_play(frequency_hz: f64, damping: f64, gap: f64, interval_s: f64, samples: usize) -> Vec<f64> {
+    let w = TAU * frequency_hz;
+    let h = interval_s / 24.0;
+    let (mut x, mut v) = (1.0_f64, 0.0_f64);
+    (0..samples)
+        .map(|_| {
+            let now = x;
+            for _ in 0..24 {
+                // velocity Verlet, the damping from the middle of the step
+                let pull = |x: f64| -w * w * (x.abs() - gap).max(0.0) * x.signum();
+                let middle = v + 0.5 * h * (pull(x) - 2.0 * damping * w * v);
+                x += h * middle;
+                v = middle + 0.5 * h * (pull(x) - 2.0 * damping * w * middle);
+            }
+            now
+        })
+        .collect()
+}
+
+#[test]
+fn with_play_the_row_has_the_values_that_a_first_part_reaches() {
+    let (mut parts, mut wrong) = (0, 0);
+    for seed in 0..8_u64 {
+        let (f, gap) = (30.0 + 11.0 * seed as f64, 0.004 + 0.002 * seed as f64);
+        let interval_s = 1.0 / (30.0 * f);
+        let decay = decay_with_play(f, 0.003, gap, interval_s, 300 * 30);
+        let found = followed(&hits(&[(vec![decay], &[1.0])], 3e-3, 500 + seed), interval_s).expect("a fit");
+        let rows = found.fit.modes();
+        // describing function of the gap
+        let at = |amplitude: f64| {
+            let r = (gap / amplitude).min(1.0);
+            f * (1.0 - 2.0 / PI * (r.asin() + r * (1.0 - r * r).sqrt())).sqrt()
+        };
+        let [row] = rows[..] else {
+            wrong += 1;
+            println!("seed {seed}: {rows:?}");
+            continue;
+        };
+        let Some(along) = found.along.first() else {
+            wrong += 1;
+            println!("seed {seed}: {rows:?}");
+            continue;
+        };
+        parts += usize::from(along.share < 1.0);
+        let (truth, std) = (at(along.laws.amplitudes.0), row.quality_factor.std / row.quality_factor.value);
+        let off = (row.frequency_hz.value - truth).abs() / row.frequency_hz.std.hypot(1e-3 * f);
+        wrong += usize::from(off > 4.0 || std > 0.3);
+        println!("seed {seed}: {} for {truth}, Q {:?}, of {}", row.frequency_hz.value, row.quality_factor, along.share);
+    }
+    assert!(wrong <= 1 && parts >= 3, "{wrong} wrong, {parts} of a first part");
+}
+
 /// Two linear modes of 0.32 and 0.48 Hz half width, so far apart; in one channel, or in two with unlike shapes.
 fn pairs_with_laws(apart_hz: &[f64], channels: usize, seeds: std::ops::Range<u64>) -> usize {
     let mut laws = 0;

@@ -90,7 +90,8 @@ impl Left {
                     None => row.to_vec(),
                 };
                 let gaps = options.missing.get(event).and_then(|rows| rows.get(channel));
-                gaps.into_iter().flatten().for_each(|gap| left[gap.clone()].fill(f64::NAN));
+                let inside = |gap: &std::ops::Range<usize>| gap.start.min(row.len())..gap.end.min(row.len());
+                gaps.into_iter().flatten().for_each(|gap| left[inside(gap)].fill(f64::NAN));
                 left
             };
             rows.iter().enumerate().map(row).collect()

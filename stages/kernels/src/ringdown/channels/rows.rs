@@ -123,7 +123,13 @@ impl<'a> Rows<'a> {
     pub fn take_laws(&mut self, tag: usize, mode: &FollowedMode, lack_of_fit: f64) {
         self.take_linear(tag, mode, lack_of_fit);
         self.followed.course.retain(|course| course.mode != tag);
-        self.followed.along.push(AmplitudeCourse { mode: tag, laws: mode.clone() });
+        self.followed.along.push(AmplitudeCourse { mode: tag, laws: mode.clone(), share: 1.0 });
+    }
+
+    /// The laws of a row hold in this share of the decays alone.
+    pub fn holds_in(&mut self, tag: usize, share: f64) {
+        let own = self.followed.along.iter_mut().filter(|along| along.mode == tag);
+        own.for_each(|along| along.share = share);
     }
 
     /// A row has frequency, damping, shape and amplitudes of a mode.
