@@ -2,6 +2,7 @@
 .PHONY: deps test-deps demo test accuracy test-interop test-slurm wheel test-wheel lint book fuzz deny sbom
 
 CMAKE_VERSION = 3.31.6
+ZIGLANG_VERSION = 0.17.1
 MDBOOK_VERSION = 0.5.4
 CARGO_FUZZ_VERSION = 0.13.2
 CARGO_DENY_VERSION = 0.20.2
@@ -48,9 +49,16 @@ test-slurm: deps .tools/snakemake/installed
 	tests/cluster/workflow.sh target/debug/afmid .tools/snakemake/bin/snakemake
 	tests/cluster/slurm.sh target/debug/afmid .tools/snakemake/bin/snakemake
 
-# The Python package as a wheel with HDF5 inside, in dist/: for every Python from 3.10 on, on this system.
-wheel: deps .tools/wheel/installed
-	.tools/wheel/bin/maturin build --release --locked --manifest-path python/afmid/native/Cargo.toml --out dist
+# Zig compiles HDF5 and links against glibc 2.28, so that the wheel installs on older systems than this one.
+ifeq ($(shell uname -s),Linux)
+ZIG = .tools/wheel/zig
+PORTABLE = --zig --compatibility manylinux_2_28 --target $(shell rustc -vV | sed -n 's/^host: //p')
+endif
+
+# The Python package as a wheel with HDF5 inside, in dist/: for every Python from 3.10 on, on this kind of system.
+wheel: deps .tools/wheel/installed $(ZIG)
+	PATH="$(CURDIR)/.tools/wheel/bin:$$PATH" .tools/wheel/bin/maturin build --release --locked $(PORTABLE) \
+		--manifest-path python/afmid/native/Cargo.toml --out dist
 
 # The same from the artifacts of the tests (no release build), installed into an empty environment without compiler or
 # cargo and tested there.
@@ -118,6 +126,10 @@ sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
 .tools/wheel/installed: tests/wheel/requirements.txt
 	python3 -m venv .tools/wheel
 	.tools/wheel/bin/python -m pip install --quiet --disable-pip-version-check -r tests/wheel/requirements.txt
+	touch $@
+
+.tools/wheel/zig: .tools/wheel/installed
+	.tools/wheel/bin/python -m pip install --quiet --disable-pip-version-check ziglang==$(ZIGLANG_VERSION)
 	touch $@
 
 # Apart from the readers: its dependencies are many.
