@@ -36,18 +36,22 @@ impl Record<'_> {
 mod tests {
     use std::f64::consts::TAU;
 
-    use super::super::{DecaySearchOptions, DismissedReason, find_decays};
+    use super::super::{DecaySearchOptions, Decline, find_decays};
+    use super::*;
     use crate::fixture::white_noise;
 
-    /// Three periods at 1 Hz of the amplitude `before`, then a release at 4.6 Hz of 10, sampled at 50 Hz.
+    /// Sample of the release.
+    const RELEASE: usize = 85;
+
+    /// Three periods at 4.6 Hz of the amplitude `before`, then a release of 10, sampled at 50 Hz.
     fn released(seed: u64, before: f64) -> Vec<f64> {
         let noise = white_noise(1500, 0.05, seed);
         let y = |k: usize| {
             let t = k as f64 / 50.0 - 1.0;
-            let release = t - 0.7;
+            let release = (k as f64 - RELEASE as f64) / 50.0;
             match () {
                 () if t < 0.0 => 0.0,
-                () if release < 0.0 => before * (TAU * 4.6 * t).sin(),
+                () if k < RELEASE => before * (TAU * 4.6 * t).sin(),
                 () => 10.0 * (-0.15 * release).exp() * (TAU * 4.6 * release).cos(),
             }
         };
@@ -60,19 +64,35 @@ mod tests {
             let y = released(seed, 1.0);
             let found = find_decays(&[&y], 50.0, &DecaySearchOptions::default()).unwrap();
             assert_eq!(found.decays.len(), 1, "seed {seed}: {found:?}");
-            assert!(found.decays[0].range.start.abs_diff(85) < 12, "seed {seed}: {:?}", found.decays[0].range);
-            let handling = |d: &super::DismissedDecay| matches!(d.reason, DismissedReason::Handling { .. });
-            assert!(found.dismissed.iter().any(handling), "seed {seed}: {:?}", found.dismissed);
+            assert!(found.decays[0].range.start.abs_diff(RELEASE) < 12, "seed {seed}: {:?}", found.decays[0].range);
         }
     }
 
     #[test]
-    fn two_hits_of_like_size_stay_two() {
-        for seed in 0..6 {
-            let y = released(seed, 4.0);
-            let found = find_decays(&[&y], 50.0, &DecaySearchOptions::default()).unwrap();
-            let handling = |d: &super::DismissedDecay| matches!(d.reason, DismissedReason::Handling { .. });
-            assert!(!found.dismissed.iter().any(handling), "seed {seed}: {:?}", found.dismissed);
+    fn what_a_far_larger_event_ends_is_dismissed_unless_its_decline_is_known() {
+        let known = Decline { rate_per_s: 0.1, std_per_s: 0.01, freedom: 5 };
+        let unknown = Decline { rate_per_s: 0.0, std_per_s: f64::INFINITY, freedom: 0 };
+        let cases = [(1.0, unknown, DecayEnd::NextEvent, 1), (4.0, unknown, DecayEnd::NextEvent, 2)];
+        let kept = [(1.0, known, DecayEnd::NextEvent, 2), (1.0, unknown, DecayEnd::Noise, 2)];
+        for (before, decline, end, left) in cases.into_iter().chain(kept) {
+            let y = released(1, before);
+            let options = DecaySearchOptions::default();
+            let record = Record::of(&[&y], 50.0, &options);
+            let mut found = find_decays(&[&y], 50.0, &options).unwrap();
+            let mut first = found.decays[0].clone();
+            (first.onset, first.range, first.end, first.decline) = (50, 50..70, end, decline);
+            let mut release = first.clone();
+            (release.onset, release.range, release.end) = (RELEASE, RELEASE..1500, DecayEnd::RecordEnd);
+            found.decays = vec![first, release];
+            record.dismiss_handling(&mut found);
+            assert_eq!(found.decays.len(), left, "{before} {decline:?} {end:?}");
+            assert_eq!(found.decays[left - 1].onset, RELEASE);
+            let ratio = found.dismissed.iter().find_map(|d| match d.reason {
+                DismissedReason::Handling { ratio } => Some(ratio),
+                _ => None,
+            });
+            // amplitudes of 1 and 10
+            assert_eq!(ratio.is_some_and(|ratio| (50.0..150.0).contains(&ratio)), left == 1, "{ratio:?}");
         }
     }
 }

@@ -121,7 +121,7 @@ pub(super) struct Record<'a> {
 }
 
 impl<'a> Record<'a> {
-    fn of(all: &[&'a [f64]], rate_hz: f64, options: &DecaySearchOptions) -> Self {
+    pub(super) fn of(all: &[&'a [f64]], rate_hz: f64, options: &DecaySearchOptions) -> Self {
         let drive = options.trigger.left_out();
         let numbers: Vec<usize> = (0..all.len()).filter(|&c| Some(c) != drive).collect();
         let channels: Vec<&[f64]> = numbers.iter().map(|&c| all[c]).collect();
