@@ -12,8 +12,8 @@ import pytest
 
 # without the native module the package reads results, and no more
 NATIVE = (
-    *("_program", "__main__", "artifacts", "decays", "densities", "diagnoses", "identification", "pairs", "rational", "reading"),
-    *("response_modes", "responses", "running", "smoothed", "thermal"),
+    *("_program", "__main__", "artifacts", "decays", "densities", "diagnosed_model", "diagnoses", "formula", "identification"),
+    *("own_causes", "own_stages", "pairs", "rational", "reading", "response_modes", "responses", "running", "smoothed", "thermal"),
 )
 collect_ignore_glob = (
     [*(f"src/afmid/{name}.py" for name in NATIVE), "src/afmid/__init__.py"]
