@@ -11,7 +11,7 @@ use super::options::ChannelOptions;
 use super::result::ChannelRingdown;
 use super::rows::Rows;
 use crate::model::{ModelError, go_on};
-use crate::ringdown::moving::{CoursePoint, FollowedLine, FollowedMode, Follows, Moving};
+use crate::ringdown::moving::{CoursePoint, FollowedLine, FollowedMode, Follows, MOST_DAMPING, Moving};
 use crate::statistics::chi_square_tail;
 
 /// A mode that follows laws of its amplitude.
@@ -230,8 +230,13 @@ impl<'a> LawFit<'a> {
         refuted
     }
 
-    /// The line in the longest first part of the decays that laws hold in, down to noise.
+    /// The line in the longest first part of the decays that laws hold in, down to noise; none of damping that laws are no
+    /// account of.
     fn first_part(&self, line: &OneLine) -> Option<FirstPart> {
+        let pole = self.all.poles[line.main];
+        if -pole.re > MOST_DAMPING * pole.im {
+            return None;
+        }
         FIRST_PARTS.into_iter().find_map(|share| {
             let cut = |row: &&[f64]| (row.len() as f64 * share) as usize;
             let part = |rows: &Vec<&'a [f64]>| rows.iter().map(|row| &row[..cut(row)]).collect();

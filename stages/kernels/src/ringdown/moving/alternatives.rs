@@ -4,7 +4,7 @@ use crate::ringdown::moving::exponentials::{Pole, exponentials, solved};
 use crate::ringdown::moving::follow::{BUDGET, LEAST_DECAY, Line, Options};
 use crate::ringdown::moving::lack::{Lack, lack};
 use crate::ringdown::moving::layout::range;
-use crate::ringdown::moving::model::{MULTIPLES, Mode};
+use crate::ringdown::moving::model::{MOST_DAMPING, MULTIPLES, Mode};
 use crate::ringdown::moving::result::Follows;
 use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit};
 use crate::ringdown::moving::select::{Rules, projected, selected};
@@ -143,9 +143,9 @@ impl Search<'_> {
             let plain = !lacks && is_of_one_cause(mode);
             let other = self.sum_of(&best, line, number, plain);
             // laws of no one cause may stand for a line beside
-            let odd = best.modes[number].moves() && !is_of_one_cause(mode);
+            let odd = mode.moves() && !is_of_one_cause(mode) && rate_at_half(mode) < MOST_DAMPING * mode.turn;
             let unexplained = left.p_value < UNEXPLAINED;
-            let beside = if unexplained || odd { self.beside(&best, line, number) } else { None };
+            let beside = if unexplained || odd { self.beside(&best, line, number, odd) } else { None };
             of_lines[line].bic_difference = other.as_ref().map(|other| own - self.bic(other));
             // as good is not enough where one mode is the plainer account, and enough where it is not
             let wanted = own - if plain { DECISIVE } else { -DECISIVE * f64::from(u8::from(!lacks)) };
@@ -171,7 +171,7 @@ impl Search<'_> {
 
     /// The mode with a linear one in its line: steady, or with a pole of the linear fit. Where a steady line stands beside
     /// a mode of one cause, the laws that stood for both are no start: plain ones are, with steady lines about the mode.
-    fn beside(&self, best: &Fit, line: usize, number: usize) -> Option<Fit> {
+    fn beside(&self, best: &Fit, line: usize, number: usize, odd: bool) -> Option<Fit> {
         let mode = &best.modes[number];
         let longest = self.problem.data.hits.iter().map(|hit| hit.duration_s).fold(0.0, f64::max);
         let low = mode.frequency.at(&values(0.05 * range(mode).1, mode.floor).value);
@@ -194,8 +194,8 @@ impl Search<'_> {
         };
         let starts = std::iter::once((0.0, low)).chain(given);
         let from_laws = starts.take(3).filter_map(|pole| with(best, pole));
-        let plain = if is_of_one_cause(mode) { None } else { self.plainly(best, number) };
-        let rate = mode.damping.at(&values(0.5 * range(mode).1, mode.floor).value).max(LEAST_DECAY / longest);
+        let plain = if odd { self.plainly(best, number) } else { None };
+        let rate = rate_at_half(mode).max(LEAST_DECAY / longest);
         let from_plain = plain.iter().flat_map(|plain| {
             let centre = plain.modes[number].frequency.at(&values(0.5 * range(mode).1, mode.floor).value);
             LINES_ABOUT.map(|widths| with(plain, (0.0, centre + widths * rate)))
@@ -309,6 +309,11 @@ impl Search<'_> {
         }
         starts
     }
+}
+
+/// Decay rate of a mode at half its largest amplitude, 1/s.
+fn rate_at_half(mode: &Mode) -> f64 {
+    mode.damping.at(&values(0.5 * range(mode).1, mode.floor).value)
 }
 
 /// Whether a common cause makes both laws.

@@ -56,5 +56,6 @@ mod wild_tests;
 
 pub use follow::{Exponential, Line, Options, follow_moving};
 pub use lack::Lack;
+pub(crate) use model::MOST_DAMPING;
 pub use result::{CoursePoint, FollowedLine, FollowedMode, Follows, Moving};
 pub use terms::Term;

@@ -6,6 +6,9 @@ use crate::ringdown::moving::path::{Laws, Path, path};
 use crate::ringdown::moving::terms::Law;
 use faer::c64;
 
+/// Largest damping ratio at which the slow equations hold: a quarter of the amplitude is lost in a period.
+pub const MOST_DAMPING: f64 = 0.05;
+
 /// Multiples of the phase that are modelled beside the first.
 pub const MULTIPLES: [usize; 2] = [2, 3];
 

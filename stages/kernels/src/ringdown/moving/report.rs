@@ -7,7 +7,7 @@ use crate::ringdown::moving::alternatives::{OfLine, Search};
 use crate::ringdown::moving::average::{Weighed, averaged};
 use crate::ringdown::moving::blocks::{Compressed, Hit};
 use crate::ringdown::moving::dense::Square;
-use crate::ringdown::moving::model::Mode;
+use crate::ringdown::moving::model::{MOST_DAMPING, Mode};
 use crate::ringdown::moving::path::path;
 use crate::ringdown::moving::result::{CoursePoint, FollowedLine, FollowedMode, LocalPole, Moving, known_or};
 use crate::ringdown::moving::search::Fit;
@@ -18,8 +18,6 @@ use crate::ringdown::moving::terms::{Law, Term};
 pub const ABOVE_NOISE: f64 = 4.0;
 /// Periods before the end of a record at which an amplitude counts as reached: an extrapolation by none.
 const LAST_PERIODS: f64 = 6.0;
-/// Largest damping ratio at which the slow equations hold: a quarter of the amplitude is lost in a period.
-const MOST_DAMPING: f64 = 0.05;
 
 impl Search<'_> {
     pub(crate) fn result(
