@@ -17,7 +17,8 @@ pub(super) struct Covariances {
     pub dispersion: f64,
 }
 
-/// `H^-1 V H^-1`: V from the bins' known correlation (model), or from the misfits themselves (robust), of few bins the larger.
+/// `H^-1 V H^-1`: V from the bins' known correlation (model), or from the misfits themselves (robust); of few bins the
+/// larger.
 pub(super) fn covariances(likelihood: &Likelihood<'_>, parameters: &Parameters, used: &[bool]) -> Covariances {
     let slopes = likelihood.slopes(parameters, used);
     let (square, _) = information(&slopes, parameters.active);
