@@ -305,6 +305,27 @@ mod tests {
         linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model")
     }
 
+    /// A disturbance that wanders, of a tenth of the output's variance.
+    #[test]
+    fn what_is_left_beyond_noise_is_no_clean_record() {
+        for seed in 0..4 {
+            let (u, v, mut output) = system(seed, 0.0);
+            let mean_square = output.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64;
+            let mut rng = ChaCha8Rng::seed_from_u64(90 + seed);
+            let mut wander = 0.0;
+            for y in &mut output {
+                let white: f64 = StandardNormal.sample(&mut rng);
+                wander = 0.95 * wander + (0.1 * mean_square * (1.0 - 0.95 * 0.95)).sqrt() * white;
+                *y += wander;
+            }
+            let half = SAMPLES / 2;
+            let found = linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model");
+            assert!(found.fit_percent > 50.0 && !found.is_adequate(0.25), "{seed}: {found:?}");
+            let answer = found.answer("held out", "V", 0.25, 0.01);
+            assert!(answer.evidence.iter().any(|line| line.contains("beyond the noise")), "{:?}", answer.evidence);
+        }
+    }
+
     #[test]
     fn linear_systems_of_two_inputs_are_adequate_and_a_bent_sensor_is_seen() {
         for seed in 0..6 {
