@@ -94,15 +94,19 @@ impl Findings<'_> {
     /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
     fn grounds(&self, named: &[NamedCause], errors: &[Option<f64>]) -> Grounds {
         let square = |rms: Option<f64>| rms.map(|rms| rms * rms);
-        let of = |cause: &NamedCause| Claim {
+        let places: Vec<usize> =
+            self.choice.chosen.iter().filter(|own| own.has_a_name()).map(|own| own.place).collect();
+        let at = |rung: usize| square(errors.get(rung).copied().flatten());
+        let of = |(cause, place): (&NamedCause, &usize)| Claim {
             id: cause.id.clone(),
             held_out: square(cause.gain.rms_before).zip(square(cause.gain.rms_after)).map(|(a, b)| [a, b]),
+            step: at(*place).zip(at(place + 1)).map_or(0.0, |(before, after)| before - after),
         };
         let ends = errors.first().copied().flatten().zip(errors.last().copied().flatten());
         Grounds {
             adequate: self.adequate,
             systematic: self.systematic(),
-            claims: named.iter().map(of).collect(),
+            claims: named.iter().zip(&places).map(of).collect(),
             unnamed: !self.choice.chosen.is_empty(),
             training: square(self.choice.ladder.last().and_then(|last| self.rms(last.fit.loss))),
             held_out: ends.map(|(before, after)| [before * before, after * after]),
@@ -135,12 +139,13 @@ impl Findings<'_> {
         let ratio = repeats(last.residual.get(self.bench.layout.part(0, 0, 0, input.len()))?, period)?;
         (ratio > REPEATS).then(|| {
             format!(
-                "what is left repeats itself every {period} samples, with the input: {ratio:.1} times the power that noise                  leaves of it"
+                "what is left repeats itself every {period} samples, with the input: {ratio:.1} times the power that noise \
+                 leaves of it"
             )
         })
     }
 
-    /// A mode of the linear model that the stretches do not let die away, in a sentence.
+    /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.
     fn endless(&self) -> Option<String> {
         let (first, layout) = (self.choice.ladder.first()?, &self.bench.layout);
         let longest = (0..layout.stretches()).map(|e| layout.samples(e)).max()?;
@@ -148,9 +153,14 @@ impl Findings<'_> {
         let goes_on = |section: &&super::dynamics::Section| {
             section.kind == Kind::Oscillator && 0.5 * section.omega() * section.loss * lasts_s < ENDLESS
         };
-        let section = first.fit.model.dynamics.sections.iter().find(goes_on).filter(|_| self.bench.driven)?;
+        // beside other modes it was looked at when they were found
+        let [section] = &first.fit.model.dynamics.sections[..] else { return None };
+        if !self.bench.driven || !goes_on(&section) {
+            return None;
+        }
         Some(format!(
-            "the linear model's oscillation at {:.4} Hz does not die away in the record: it stands for something else, an              integrator or a line",
+            "the linear model's oscillation at {:.4} Hz does not die away in the record: it stands for something else, an \
+             integrator or a line",
             section.frequency_hz
         ))
     }

@@ -6,8 +6,12 @@ use super::verdict::Verdict;
 /// may stand for a part of what is left, whatever that is; half, since names beside one another do some of each other's
 /// work when one is left out.
 const OF_EXCESS: f64 = 0.5;
-/// Mean square on held-out data over that of training from which on they do not agree: an error larger by two fifths.
-const AGREES: f64 = 2.0;
+/// Share of what all causes take together, of the squared error of what was held out, that those without a name may take.
+/// Why: names beside as much else may stand for what that is part of.
+const BESIDE: f64 = 0.05;
+/// Mean square on held-out data over that of training from which on they do not agree: an error twice as large. Why not
+/// less: a part to judge on begins in a state that few samples tell.
+const AGREES: f64 = 4.0;
 
 /// A cause before it is named.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +20,8 @@ pub struct Claim {
     pub id: String,
     /// Mean squared errors on what did not choose it, without it and with it.
     pub held_out: Option<[f64; 2]>,
+    /// By how much it lowered the mean square of what was held out when it was added.
+    pub step: f64,
 }
 
 /// What a verdict is made from; mean squares are of the output, in one unit.
@@ -55,7 +61,7 @@ pub struct Ruling {
 impl Grounds {
     /// # Method
     /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves there
-    /// beyond noise. `named` if a name stands, the model is adequate, nothing systematic is left, and the answer's error
+    /// beyond noise. `named` if a name stands, those that fall took a twentieth of what all take at most, the model is adequate, nothing systematic is left, and the answer's error
     /// on what was held out is below the linear model's. `clean` if there is no cause, and neither a test nor the held-out
     /// error contradict. Else `unexplained`.
     pub fn ruling(&self) -> Ruling {
@@ -81,12 +87,24 @@ impl Grounds {
             let found = if against.is_empty() { Verdict::Clean } else { Verdict::Unexplained };
             return verdict(found, Vec::new(), against);
         }
-        let (mut stand, mut fallen) = (Vec::new(), Vec::new());
+        let (mut stand, mut fallen, mut beside) = (Vec::new(), Vec::new(), 0.0);
         for (number, claim) in self.claims.iter().enumerate() {
             match self.too_little(claim) {
                 None => stand.push(number),
-                Some(said) => fallen.push(said),
+                Some(said) => {
+                    fallen.push(said);
+                    beside += claim.step.max(0.0);
+                }
             }
+        }
+        let taken = self.held_out.map_or(0.0, |[before, after]| before - after);
+        if !stand.is_empty() && beside > BESIDE * taken {
+            fallen.push(format!(
+                "those without a name take {:.1} % of what all causes take together: the others may stand for what those are \
+                 part of",
+                100.0 * beside / taken
+            ));
+            stand.clear();
         }
         let found = if stand.is_empty() { Verdict::Unexplained } else { Verdict::Named };
         verdict(found, stand, fallen)
@@ -99,11 +117,12 @@ impl Grounds {
         if gain.is_nan() || gain <= 0.0 {
             return Some(format!("{} does not lower the error of what was held out: no name", claim.id));
         }
-        let excess = with - self.noise?;
+        // what was held out has the error of its own beginning, too
+        let excess = self.training.map_or(with, |training| training.min(with)) - self.noise?;
         (gain < OF_EXCESS * excess).then(|| {
             format!(
-                "{} takes {:.1} % of the squared error that is left beyond noise on what was held out: too little for a \
-                 name, it may stand for any of that",
+                "{} takes {:.1} % of the squared error that is left beyond noise: too little for a name, it may stand for any \
+                 of that",
                 claim.id,
                 100.0 * gain / excess
             )
@@ -176,7 +195,7 @@ mod tests {
     use crate::fixture::white_noise;
 
     fn claim(id: &str, held_out: [f64; 2]) -> Claim {
-        Claim { id: id.to_owned(), held_out: Some(held_out) }
+        Claim { id: id.to_owned(), held_out: Some(held_out), step: held_out[0] - held_out[1] }
     }
 
     fn fine() -> Grounds {
@@ -195,7 +214,7 @@ mod tests {
         let wrong = [
             Grounds { adequate: false, ..fine() },
             Grounds { systematic: true, ..fine() },
-            Grounds { held_out: Some([2.1, 2.1]), ..fine() },
+            Grounds { held_out: Some([4.1, 4.1]), ..fine() },
             Grounds { held_out: Some([f64::NAN, f64::NAN]), ..fine() },
             Grounds { against_clean: vec!["it repeats".to_owned()], ..fine() },
             Grounds { against_all: vec!["the input follows the output".to_owned()], ..fine() },
@@ -218,6 +237,9 @@ mod tests {
         let found = of(vec![claim("a", [9.0, 1.0]), claim("b", [1.01, 1.0])], [9.0, 1.0], 0.1);
         assert_eq!((found.verdict, found.stand), (Verdict::Named, vec![0]));
         assert!(found.because.len() == 1 && found.because[0].starts_with("b takes 1.1 %"), "{:?}", found.because);
+        // and none stands beside others that took a tenth
+        let found = of(vec![claim("a", [9.0, 1.0]), Claim { step: 0.9, ..claim("b", [1.01, 1.0]) }], [9.0, 1.0], 0.1);
+        assert_eq!((found.verdict, found.stand.len(), found.because.len()), (Verdict::Unexplained, 0, 2));
         let found = of(vec![claim("b", [1.01, 1.0])], [9.0, 1.0], 0.1);
         assert_eq!(found.verdict, Verdict::Unexplained);
         let found = of(vec![claim("c", [0.9, 1.0])], [9.0, 1.0], 1.0);

@@ -44,7 +44,7 @@ impl Findings<'_> {
     fn diagnosis(&self, adequacy: &Adequacy, before: &[f64], after: &[f64]) -> Diagnosis {
         let left = self.choice.left.iter().any(|(_, share)| *share > TOLERATED);
         let all = self.named();
-        let claim = |cause: &NamedCause| Claim { id: cause.id.clone(), held_out: None };
+        let claim = |cause: &NamedCause| Claim { id: cause.id.clone(), held_out: None, step: 0.0 };
         let claims = all.iter().map(claim).collect();
         let grounds = Grounds { adequate: adequacy.adequate, systematic: left, claims, ..Grounds::default() };
         let Ruling { verdict, stand, .. } = grounds.ruling();
