@@ -12,7 +12,7 @@ use super::runs::{Lowered, Restored};
 use super::{closed_loop, several_inputs, steady};
 use crate::artifacts::{Decays, Pair};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
-use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Simulation, Story};
+use afmid_kernels::diagnosis::{DiagnosisError, DiagnosisOptions, Sensed, Simulation, Story};
 
 /// Says what a linear model gets wrong in a measured input and output, in free decays, in an axis under a
 /// controller, or in a steady oscillation: names the causes, extends the model, measures the gain.
@@ -25,7 +25,7 @@ use afmid_kernels::diagnosis::{DiagnosisOptions, Sensed, Simulation, Story};
 /// a `reference` the drive depends on the output: an axis `M v' + Fv v + Fc sgn v + F0 = G u` under a controller that
 /// is identified too, the loop simulated from its reference. `records` alone hold a steady oscillation: harmonics
 /// against a detector's static curves. Under several inputs no cause is tried: the answer is whether a linear model of
-/// all of them is adequate.
+/// all of them is adequate; likewise under one, where no linear model that causes could extend is found.
 /// # Method
 /// Least squares of the free-run error on what is learnt from; causes by score test, joint refits, F tests by blocks
 /// against the part of the residual that no general term predicts, corrected for all trials, each of which has to lower
@@ -156,7 +156,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 7,
+        version: 8,
         summary: "names what a linear model gets wrong: inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec(), MODEL.spec()],
@@ -197,7 +197,13 @@ impl Stage for CausesDiagnose {
                 if whole.input.len() > whole.output.len() {
                     several_inputs::answer(self, &pair, &whole.input, &whole.output, cx)?
                 } else {
-                    self.extended(&self.forced(&pair, &whole)?)?
+                    match self.diagnosed(&self.forced(&pair, &whole)?) {
+                        // the verdict on a linear model of any order is still possible
+                        Err(DiagnosisError::NoBaseline) => {
+                            several_inputs::answer(self, &pair, &whole.input, &whole.output, cx)?
+                        }
+                        found => found.map_err(StageError::from_error)?,
+                    }
                 }
             }
             (None, Some(decays), None) => {

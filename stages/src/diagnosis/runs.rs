@@ -5,7 +5,9 @@ use afmid_pipeline::{Array, StageError};
 use super::causes_stage::{Answer, CausesDiagnose, JudgedPart, simulation};
 use crate::artifacts::{DataSet, Decays, Pair};
 use crate::causes::{Cause, catalogue, runs_have};
-use afmid_kernels::diagnosis::{Diagnosed, DiagnosisOptions, Part, PartStart, Record, Sensed, Stretch, diagnose};
+use afmid_kernels::diagnosis::{
+    Diagnosed, DiagnosisError, DiagnosisOptions, Part, PartStart, Record, Sensed, Stretch, diagnose,
+};
 use afmid_kernels::signal::decimate;
 
 /// Input and output with the means that were taken off them: a curve has its zero where the record has.
@@ -137,8 +139,13 @@ impl CausesDiagnose {
 
     /// The linear model of what was measured, extended.
     pub(super) fn extended(&self, measured: &Measured<'_>) -> Result<Answer, StageError> {
+        self.diagnosed(measured).map_err(StageError::from_error)
+    }
+
+    /// The same. Errors: the kernel's own.
+    pub(super) fn diagnosed(&self, measured: &Measured<'_>) -> Result<Answer, DiagnosisError> {
         let options = self.options(measured);
-        let found = diagnose(&measured.records, measured.interval_s, &options).map_err(StageError::from_error)?;
+        let found = diagnose(&measured.records, measured.interval_s, &options)?;
         Ok(Answer {
             simulation: measured.simulation(&found),
             model: Some(found.simulation),

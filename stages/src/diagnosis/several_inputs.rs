@@ -1,4 +1,4 @@
-//! A system under several inputs: whether a linear model is adequate.
+//! A system under several inputs, or one that no cause can extend: whether a linear model is adequate.
 
 use afmid_kernels::diagnosis::{Story, halves, linear_only};
 use afmid_pipeline::{Context, StageError};
@@ -8,7 +8,7 @@ use super::runs::identification;
 use crate::artifacts::Pair;
 use crate::watched::Watched;
 
-/// The verdict on a linear model of all inputs; no cause is tried.
+/// The verdict on a linear model of all inputs, one or several; no cause is tried.
 ///
 /// Errors: too few samples for a fit.
 pub(super) fn answer(
@@ -35,9 +35,10 @@ pub(super) fn answer(
     let measured = output[held_out.clone()].to_vec();
     let part = part.map_or("held out", |part| &part.name[..]);
     let mut diagnosis = found.answer(part, &unit, stage.tolerated_misfit, stage.false_alarm_rate);
-    diagnosis
-        .evidence
-        .push(format!("of {} inputs together no cause is tried: causes act on the response to one", inputs.len()));
+    diagnosis.evidence.push(match inputs.len() {
+        1 => "no linear model that causes could extend follows the output: no cause is tried".to_owned(),
+        count => format!("of {count} inputs together no cause is tried: causes act on the response to one"),
+    });
     let time = held_out.map(|k| k as f64 / rate).collect();
     let simulated = [&found.simulated[..], &found.simulated[..]];
     Ok(Answer {

@@ -99,8 +99,10 @@ pub fn diagnose(
         None => baselines(records, &sample, &starts, options)?,
     };
     let mut extended = Vec::new();
+    let mut work = WORK;
     for baseline in found {
-        let found = extend(baseline, options);
+        let (found, used) = extend(baseline, options, work.max(WORK / LEAST_SHARE));
+        work = work.saturating_sub(used);
         let enough = found.adequate;
         extended.push(found);
         if enough {
@@ -109,8 +111,10 @@ pub fn diagnose(
     }
     // the first that is as good as any linear model; else the last, which a linear model alone is
     let Some(last) = extended.pop() else { return Err(DiagnosisError::NoBaseline) };
-    let Extended { bench, blocks, choice, adequate } =
-        last.on_all(records, interval_s, options).ok_or(DiagnosisError::NoBaseline)?;
+    let Extended { bench, blocks, choice, adequate } = last
+        .on_all(records, interval_s, options)
+        .or_else(|| last.linear_on_all(records, interval_s, options))
+        .ok_or(DiagnosisError::NoBaseline)?;
     let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
     let unnamed = unnamed_law(
@@ -189,28 +193,33 @@ pub(super) struct Extended {
     pub adequate: bool,
 }
 
-fn extend(baseline: Baseline, options: &DiagnosisOptions) -> Extended {
+/// Extends a baseline with at most so much work; how much it was.
+fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extended, u64) {
     let Baseline { fit, bench, adequacy } = baseline;
     let blocks = blocks(&bench, &fit);
     let candidates = candidates(options, &bench, &fit.model);
+    let begin = bench.work();
     let search = Search {
         bench: &bench,
         blocks: blocks.clone(),
         options,
         trials: trials(&bench, &fit, &candidates),
-        end: bench.work() + WORK,
+        end: begin + work,
         candidates,
     };
     let choice = search.run(fit);
     // where the linear model is the best there is, what extends it need not pay for itself in blocks: F tests decide
     let ends = [choice.ladder.first(), choice.ladder.last()];
     let adequate = ends.iter().flatten().any(|model| adequacy.holds(criterion(&bench, &model.fit)));
-    Extended { bench, blocks, choice, adequate }
+    let used = bench.work() - begin;
+    (Extended { bench, blocks, choice, adequate }, used)
 }
 
-/// Steps of sections that a search may take, ten seconds of two cores: single causes take a tenth of it, five causes of
-/// a measured system a half.
+/// Steps of sections that the searches from all baselines may take together, ten seconds of two cores: single causes take a
+/// tenth of it, five causes of a measured system a half.
 const WORK: u64 = 5_000_000_000;
+/// Of that each baseline has one in so many, whatever those before it took.
+const LEAST_SHARE: u64 = 5;
 
 /// Fewest records that show a change from one to the next: its slope, and whether it is one.
 const ARCHIVE: usize = 4;

@@ -7,9 +7,11 @@ use super::data::{LEAST_SAMPLES, Layout, Stretch};
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Moments};
 use super::lack_of_fit::{Misfit, RIDGE};
+use super::ruling::{Grounds, Ruling, high_band_variance, repeats};
 use super::verdict::{BaselineSummary, Diagnosis, Validation, Verdict};
 use crate::Monitor;
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
+use crate::spectra::period_samples;
 use crate::validation::{Nuisances, choose_order, simulate_held_out};
 
 /// A linear model whose order the data chose, judged on samples that it was not fitted to.
@@ -21,6 +23,13 @@ pub struct LinearOnly {
     pub fit_percent: f64,
     /// Root mean square of its error there.
     pub rms: f64,
+    /// The same of the samples that it was fitted to.
+    pub training_rms: f64,
+    /// Variance of its error there beyond that of the noise, from where the system does not respond, over that of the
+    /// output; none where too little was held out.
+    pub beyond_noise: Option<f64>,
+    /// Power of that error that repeats itself with the inputs over what noise leaves of it; none where they do not.
+    pub repeats: Option<f64>,
     /// What static terms of inputs, output and rate of the output still predict of that error.
     pub misfit: Misfit,
     /// Its simulation of what was held out.
@@ -37,21 +46,52 @@ const BLOCKS: usize = 48;
 /// which the baselines of causes count as none.
 const FOLLOWS: f64 = 10.0;
 
+/// Share of the output's variance that may be left beyond noise of a model that is the whole story.
+const BEYOND: f64 = 0.02;
+/// Power that repeats itself with the inputs over that of noise, from which on it is more than a model may leave.
+const REPEATS: f64 = 2.0;
+
 impl LinearOnly {
-    /// Whether it describes what was measured: the output follows from the inputs, and no product of them predicts more
-    /// than is tolerated.
+    /// Whether it describes what was measured: the output follows from the inputs, no product of them predicts more
+    /// than is tolerated, and what was held out agrees.
     pub fn is_adequate(&self, tolerated: f64) -> bool {
-        self.fit_percent > FOLLOWS && !self.misfit.is_systematic(tolerated)
+        self.ruling(tolerated).verdict == Verdict::Clean
+    }
+
+    fn ruling(&self, tolerated: f64) -> Ruling {
+        let mut against = Vec::new();
+        if let Some(share) = self.beyond_noise.filter(|share| *share > BEYOND) {
+            against.push(format!(
+                "the error there beyond the noise of its high band is {:.1} % of the output's variance: a linear model \
+                 does not account for it",
+                100.0 * share
+            ));
+        }
+        if let Some(ratio) = self.repeats.filter(|ratio| *ratio > REPEATS) {
+            against.push(format!(
+                "the error there repeats itself with the inputs: {ratio:.1} times the power that noise leaves of it"
+            ));
+        }
+        let grounds = Grounds {
+            adequate: self.fit_percent > FOLLOWS,
+            systematic: self.misfit.is_systematic(tolerated),
+            training: Some(self.training_rms.powi(2)),
+            held_out: Some([self.rms.powi(2); 2]),
+            against_clean: against,
+            ..Grounds::default()
+        };
+        grounds.ruling()
     }
 
     /// The verdict on it alone: no cause, whatever it says.
     ///
     /// `part`: name of what was held out.
     pub fn answer(&self, part: &str, unit: &str, tolerated: f64, false_alarm_rate: f64) -> Diagnosis {
-        let adequate = self.is_adequate(tolerated);
+        let Ruling { verdict, because, .. } = self.ruling(tolerated);
+        let adequate = verdict == Verdict::Clean;
         let noise = self.rms * (1.0 - self.misfit.share()).sqrt();
         Diagnosis {
-            verdict: if adequate { Verdict::Clean } else { Verdict::Unexplained },
+            verdict,
             p_value: None,
             baseline: BaselineSummary {
                 adequate,
@@ -61,7 +101,7 @@ impl LinearOnly {
                 distortion_rms: Some((self.rms.powi(2) - noise.powi(2)).max(0.0).sqrt()),
             },
             causes: Vec::new(),
-            evidence: self.sentences(tolerated),
+            evidence: self.sentences(tolerated).into_iter().chain(because).collect(),
             nearest: Vec::new(),
             modes_before: Vec::new(),
             modes_after: Vec::new(),
@@ -83,10 +123,11 @@ impl LinearOnly {
             100.0 * self.misfit.share(),
             self.misfit.significance
         );
-        let end = match (self.fit_percent > FOLLOWS, self.is_adequate(tolerated)) {
-            (_, true) => format!("{predicted}: nothing speaks against a linear model"),
-            (true, false) => format!("{predicted}: a linear model is not enough"),
-            (false, false) => "the output does not follow from the inputs by a linear model".to_owned(),
+        let end = match (self.fit_percent > FOLLOWS, self.misfit.is_systematic(tolerated)) {
+            (false, _) => "the output does not follow from the inputs by a linear model".to_owned(),
+            (true, true) => format!("{predicted}: a linear model is not enough"),
+            (true, false) if self.misfit.is_significant() => format!("{predicted}, which is tolerated"),
+            (true, false) => format!("{predicted}, which may be chance"),
         };
         let fit = format!(
             "a linear model of order {}, chosen by the data that it was fitted to, has a FIT of {:.1} % on what was held out",
@@ -167,7 +208,22 @@ pub fn linear_only(
     let through = |term: &[f64]| fit.model.simulate(term, &vec![0.0; fit.model.order()]).unwrap_or_default();
     let misfit = bent(&u, &simulated, &error, &through);
     let rms = (error.iter().map(|e| e * e).sum::<f64>() / error.len().max(1) as f64).sqrt();
-    Ok(LinearOnly { order: fit.model.order(), fit_percent: simulation.fit_percent, rms, misfit, simulated })
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    let variance = y.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / y.len().max(1) as f64;
+    let beyond = |noise: f64| (rms * rms - noise).max(0.0) / variance.max(f64::MIN_POSITIVE);
+    let all: Vec<&[f64]> = u.chunks(y.len().max(1)).collect();
+    let left = fit.residuals.iter().flatten().filter(|e| e.is_finite());
+    let (sum, count) = left.fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
+    Ok(LinearOnly {
+        order: fit.model.order(),
+        fit_percent: simulation.fit_percent,
+        rms,
+        training_rms: (sum / f64::max(count, 1.0)).sqrt(),
+        beyond_noise: high_band_variance(&error).map(beyond),
+        repeats: period_samples(&all).and_then(|period| repeats(&error, period)),
+        misfit,
+        simulated,
+    })
 }
 
 /// What products of inputs, output and rate predict of an error beyond what they themselves do.
@@ -247,6 +303,27 @@ mod tests {
         let (u, v, output) = system(seed, square);
         let half = SAMPLES / 2;
         linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model")
+    }
+
+    /// A disturbance that wanders, of a tenth of the output's variance.
+    #[test]
+    fn what_is_left_beyond_noise_is_no_clean_record() {
+        for seed in 0..4 {
+            let (u, v, mut output) = system(seed, 0.0);
+            let mean_square = output.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64;
+            let mut rng = ChaCha8Rng::seed_from_u64(90 + seed);
+            let mut wander = 0.0;
+            for y in &mut output {
+                let white: f64 = StandardNormal.sample(&mut rng);
+                wander = 0.95 * wander + (0.1 * mean_square * (1.0 - 0.95 * 0.95)).sqrt() * white;
+                *y += wander;
+            }
+            let half = SAMPLES / 2;
+            let found = linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model");
+            assert!(found.fit_percent > 50.0 && !found.is_adequate(0.25), "{seed}: {found:?}");
+            let answer = found.answer("held out", "V", 0.25, 0.01);
+            assert!(answer.evidence.iter().any(|line| line.contains("beyond the noise")), "{:?}", answer.evidence);
+        }
     }
 
     #[test]

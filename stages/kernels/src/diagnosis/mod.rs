@@ -4,7 +4,7 @@
 //! simulated), fit (least squares of the free-run error, blocks, folds), baseline (the linear model, found by itself),
 //! score_test (which causes could make what is left), selection (forward steps, backward elimination, exchange),
 //! library (general terms, whatever the cause), lack_of_fit (whether they predict what remains), unnamed_law (whether one
-//! of them does more than the names miss), chain (linear parts around a static curve, where no causes
+//! of them does more than the names miss), ruling (what follows from all that: the verdict), chain (linear parts around a static curve, where no causes
 //! account for the data), linear_only (how far a linear model goes, where none can be extended), validation (parts that
 //! chose nothing), simulation (of other inputs, with the model that it ends with), story (what a person looks at), answer.
 //!
@@ -35,6 +35,7 @@ mod linear_only;
 mod options;
 pub mod records;
 pub mod release;
+mod ruling;
 mod score_test;
 mod selection;
 mod settled;
@@ -55,5 +56,6 @@ pub use fit::Fit;
 pub use lack_of_fit::Misfit;
 pub use linear_only::{LinearOnly, halves, linear_only};
 pub use options::DiagnosisOptions;
+pub use ruling::{Claim, Grounds, Ruling, high_band_variance, repeats};
 pub use simulation::{Drive, ModalSimulation, PlacedCause, Simulation, SimulationError};
 pub use story::{Binned, Spectra, Story};

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::baseline::blocks;
-use super::data::Record;
+use super::data::{Bench, Record};
 use super::diagnose::Extended;
 use super::dynamics::Model;
 use super::fit::{Chords, Fit, Moments, Until, with_own};
@@ -34,14 +34,9 @@ impl Extended {
     ///
     /// # Method
     /// Backward elimination, the cause first that loses most by being there.
-    pub fn on_all(self, records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions) -> Option<Self> {
-        let here = self.bench.stretches == options.training && self.bench.interval_s == interval_s;
+    pub fn on_all(&self, records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions) -> Option<Self> {
         let first = self.choice.ladder.first()?;
-        let highest_hz = first.fit.model.dynamics.highest_hz();
-        let bench = match here {
-            true => self.bench.clone(),
-            false => self.bench.at_interval(records, &options.training, interval_s, highest_hz)?,
-        };
+        let (here, bench) = self.bench_of_all(records, interval_s, options)?;
         let blocks = blocks(&bench, &first.fit);
         let fitted = |model: &Model, until: Until| {
             let mut start = if here { model.clone() } else { with_own(&bench, model) };
@@ -100,7 +95,9 @@ impl Extended {
             };
             let without = standings.into_iter().nth(which).and_then(|s| s.without).map(|(_, model)| model);
             let next = without.unwrap_or_else(|| last.fit.model.without(which));
-            last = Judged::new(Fit::new(&bench, &next, Until::MINIMUM)?, &bench, &blocks);
+            // one whose absence diverges stays
+            let Some(fit) = Fit::new(&bench, &next, Until::MINIMUM) else { break };
+            last = Judged::new(fit, &bench, &blocks);
             models.remove(which + 1);
             models.iter_mut().skip(which + 1).for_each(|model| *model = model.without(which));
             unchanged = unchanged.min(which + 1);
@@ -112,12 +109,46 @@ impl Extended {
         for (rung, model) in models.iter().enumerate().take(between.end).skip(between.start) {
             let known = (rung < unchanged).then(|| self.choice.ladder[rung].clone());
             let until = if here { Until::MINIMUM } else { PASSED };
-            ladder.push(known.or_else(|| fitted(model, until))?);
+            // where its own values diverge, from those of the last model
+            let from_last = || {
+                let more = (rung..last.fit.model.causes.len()).rev();
+                fitted(&more.fold(last.fit.model.clone(), |model, which| model.without(which)), until)
+            };
+            ladder.push(known.or_else(|| fitted(model, until)).or_else(from_last)?);
         }
         if models.len() > 1 {
             ladder.push(last);
         }
-        Some(Self { choice: Choice { ladder, chosen, ..self.choice }, bench, blocks, ..self })
+        let nearest = self.choice.nearest.clone();
+        Some(Self { choice: Choice { ladder, chosen, nearest }, bench, blocks, adequate: self.adequate })
+    }
+
+    /// The linear model alone on all samples: no account of them, where what extends it diverges there. None: it diverges,
+    /// too.
+    pub fn linear_on_all(&self, records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions) -> Option<Self> {
+        let (here, bench) = self.bench_of_all(records, interval_s, options)?;
+        let first = self.choice.ladder.first()?;
+        let blocks = blocks(&bench, &first.fit);
+        let mut start = if here { first.fit.model.clone() } else { with_own(&bench, &first.fit.model) };
+        start.dynamics.interval_s = interval_s;
+        let ladder = vec![Judged::new(Fit::new(&bench, &start, Until::MINIMUM)?, &bench, &blocks)];
+        let choice = Choice { ladder, chosen: Vec::new(), nearest: self.choice.nearest.clone() };
+        Some(Self { choice, bench, blocks, adequate: false })
+    }
+
+    /// All samples, and whether they are those that the search had.
+    fn bench_of_all(
+        &self,
+        records: &[Record<'_>],
+        interval_s: f64,
+        options: &DiagnosisOptions,
+    ) -> Option<(bool, Bench)> {
+        let here = self.bench.stretches == options.training && self.bench.interval_s == interval_s;
+        if here {
+            return Some((true, self.bench.clone()));
+        }
+        let highest_hz = self.choice.ladder.first()?.fit.model.dynamics.highest_hz();
+        Some((false, self.bench.at_interval(records, &options.training, interval_s, highest_hz)?))
     }
 }
 

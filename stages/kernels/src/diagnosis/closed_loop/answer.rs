@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use crate::diagnosis::ruling::{Claim, Grounds, Ruling};
 use crate::diagnosis::verdict::{
     BaselineSummary, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
@@ -42,12 +43,12 @@ pub(super) fn answer(bench: Bench<'_>, options: &ClosedLoopOptions<'_>, choice: 
 impl Findings<'_> {
     fn diagnosis(&self, adequacy: &Adequacy, before: &[f64], after: &[f64]) -> Diagnosis {
         let left = self.choice.left.iter().any(|(_, share)| *share > TOLERATED);
-        let verdict = match (adequacy.adequate && !left, self.choice.steps.is_empty()) {
-            (false, _) => Verdict::Unexplained,
-            (true, true) => Verdict::Clean,
-            (true, false) => Verdict::Named,
-        };
-        let named = if verdict == Verdict::Named { self.named() } else { Vec::new() };
+        let all = self.named();
+        let claim = |cause: &NamedCause| Claim { id: cause.id.clone(), held_out: None, step: 0.0 };
+        let claims = all.iter().map(claim).collect();
+        let grounds = Grounds { adequate: adequacy.adequate, systematic: left, claims, ..Grounds::default() };
+        let Ruling { verdict, stand, .. } = grounds.ruling();
+        let named = stand.into_iter().filter_map(|number| all.get(number).cloned()).collect();
         let p_values = self.choice.steps.iter().map(|step| step.trial.p_value);
         let training = self.rms(before, &self.bench.training);
         Diagnosis {
