@@ -8,6 +8,7 @@ use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
 use super::density;
+use super::diagnosis_config;
 use super::points;
 use super::recordings::Source;
 use super::stated;
@@ -23,6 +24,8 @@ pub struct Wanted<'a> {
     pub goal: Option<Goal>,
     pub channels: &'a [String],
     pub inputs: &'a [String],
+    /// Of a diagnosis: what the output is to follow.
+    pub reference: Option<&'a str>,
     pub records_are: Option<RecordsAre>,
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
@@ -68,6 +71,8 @@ impl Choice<'_> {
             return (include_str!("../../configs/thermal-spectrum.toml"), "io.spectrum");
         }
         match (self.goal, self.inputs.is_empty()) {
+            (Goal::InputOutput, _) if self.diagnosis.is_some() => (diagnosis_config::template(self.goal), "io.columns"),
+            _ if self.diagnosis.is_some() => (diagnosis_config::template(self.goal), "io.records"),
             (Goal::Frf, false) => (include_str!("../../configs/hammer.toml"), "io.columns"),
             (Goal::Frf, true) => (self.goal.config(), "io.frf"),
             (Goal::InputOutput, _) => (self.goal.config(), "io.columns"),
@@ -118,8 +123,11 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             continue;
         }
         match line.split_once(" = ") {
-            Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.goal.name())),
+            Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.name())),
             Some(("params", _)) if stage == reader => text.push_str(&params),
+            Some(("params", _)) if stage == "\"diagnosis.causes\"" => {
+                text.push_str(&diagnosis_config::params(choice).unwrap_or_default());
+            }
             // the band is one of its data
             Some(("params", _)) if stage == "\"spectrum.thermal\"" => {}
             Some(("params", _)) if stage == "\"events.decay\"" => {
@@ -247,6 +255,7 @@ pub fn columns(
     if let Some(unit) = wanted.unit {
         params.insert("output_unit".to_owned(), text(unit));
     }
+    choice.diagnosis.iter().for_each(|diagnosed| diagnosis_config::stretches(diagnosed, &mut params));
     Ok(format!("params = {}\n", Value::Table(params)))
 }
 
@@ -299,6 +308,7 @@ mod tests {
             goal: Some(goal),
             channels: &[],
             inputs: &[],
+            reference: None,
             records_are: None,
             rate_hz: None,
             unit: None,
