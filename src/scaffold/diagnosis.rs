@@ -17,8 +17,8 @@ use crate::inspect::Channel;
 pub struct Diagnosed<'a> {
     /// The input that the output is to follow, of an axis in its loop.
     pub reference: Option<&'a Channel>,
-    /// Samples of input and output that are compared; none of other recordings.
-    pub samples: Option<Range<usize>>,
+    /// Samples that are learnt from, and those that follow; none where the stage's halves are meant.
+    pub stretches: Option<[Range<usize>; 2]>,
 }
 
 /// What is diagnosed. Errors: what is not known, and how to say it; nothing that can be diagnosed.
@@ -116,12 +116,14 @@ fn forced<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, looks: Choice<'a>) -> R
     }
     let output = one_output(file, wanted, &looks.inputs)?;
     one_file(source, "input and output")?;
-    let (samples, note) = longest(file, &looks.inputs, output, wanted)?;
+    let (longest, note) = longest(file, &looks.inputs, output, wanted)?;
+    let middle = longest.start.midpoint(longest.end);
+    let stretches = note.is_some().then(|| [longest.start..middle, middle..longest.end]);
     let measured = if looks.inputs.len() > 1 { "inputs" } else { "input" };
     let (names, record) = (listed(&looks.inputs), source.name());
     let why = format!("measured {measured} {names} and output {} in {record}", output.location);
     let notes = looks.notes.into_iter().chain(note).collect();
-    let diagnosis = Some(Diagnosed { reference: None, samples: Some(samples) });
+    let diagnosis = Some(Diagnosed { reference: None, stretches });
     Ok(Choice { inputs: looks.inputs, notes, diagnosis, ..Choice::of(Goal::InputOutput, vec![output], why) })
 }
 
@@ -154,7 +156,10 @@ fn axis<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, reference: &str) -> Resul
     let all: Vec<&Channel> = std::iter::once(reference).chain(drives).collect();
     let output = one_output(file, wanted, &all)?;
     one_file(source, "an axis in its loop")?;
-    let (samples, note) = longest(file, &all, output, wanted)?;
+    let (longest, note) = longest(file, &all, output, wanted)?;
+    // a loop is learnt from as a whole: its motions back and forth differ
+    let last = longest.end.saturating_sub(1).max(longest.start);
+    let stretches = Some([longest.start..last, last..longest.end]);
     let why = format!(
         "{} follows {}, driven by {}, in {}",
         output.location,
@@ -162,9 +167,10 @@ fn axis<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, reference: &str) -> Resul
         listed(&all[1..]),
         source.name()
     );
-    let scale = "forces are in the unit of the drive: `drive_scale` and `force_unit` say how much force that is".to_owned();
+    let scale =
+        "forces are in the unit of the drive: `drive_scale` and `force_unit` say how much force that is".to_owned();
     let notes = note.into_iter().chain([scale]).collect();
-    let diagnosis = Some(Diagnosed { reference: Some(reference), samples: Some(samples) });
+    let diagnosis = Some(Diagnosed { reference: Some(reference), stretches });
     Ok(Choice { inputs: all, notes, diagnosis, ..Choice::of(Goal::InputOutput, vec![output], why) })
 }
 

@@ -1,5 +1,7 @@
 //! The configs of a diagnosis of anything but releases, whose config ships.
 
+use std::ops::Range;
+
 use afmid_pipeline::toml::{Table, Value};
 
 use super::choice::Choice;
@@ -32,20 +34,40 @@ uses = "diagnosis.causes"
 inputs = { decays = "events.decays" }
 "#;
 
-/// Of a measured input and output, and of an axis in its loop.
+/// Of a measured input and output.
 const PAIR: &str = r#"# What a linear model of input and output gets wrong: the causes by name, what each gains, or an honest "unexplained".
 [pipeline]
 name = "diagnosis"
 seed = 1
 
-# the diagnosis learns from `identification`, all but the last sample; it needs no `verification`
 [[stage]]
 id = "data"
 uses = "io.columns"
 params = {}
 
-# gains are those on folds of the record; `parts = [{ name = "last", first = 8000, end = 10000, state_samples = 50 }]` judges on
-# samples that choose nothing: leave them out of `identification`
+# the first half is learnt from, gains are those on folds of it; the second one judges how far a linear model goes, and the
+# causes with `parts = [{ name = "second half", first = 5000, end = 10000, state_samples = 50 }]`
+[[stage]]
+id = "diagnosis"
+uses = "diagnosis.causes"
+inputs = { pair = "data.pair" }
+params = { linear_fit = true }
+"#;
+
+/// Of an axis in its loop.
+const AXIS: &str = r#"# What a mass with viscous friction in its control loop gets wrong: the causes by name, what each gains, or an honest
+# "unexplained".
+[pipeline]
+name = "diagnosis"
+seed = 1
+
+# all but the last sample is learnt from; nothing is taken off: positions are where the axis is
+[[stage]]
+id = "data"
+uses = "io.columns"
+params = {}
+
+# gains are those on blocks of the record, each held out in turn; `drive_scale` is the force per unit of the drive
 [[stage]]
 id = "diagnosis"
 uses = "diagnosis.causes"
@@ -72,35 +94,36 @@ inputs = { records = "records" }
 "#;
 
 /// The config of that kind of recordings.
-pub const fn template(goal: Goal) -> &'static str {
-    match goal {
-        Goal::Steady => STEADY,
-        Goal::InputOutput => PAIR,
+pub const fn template(goal: Goal, diagnosed: &Diagnosed<'_>) -> &'static str {
+    match (goal, diagnosed.reference) {
+        (Goal::Steady, _) => STEADY,
+        (Goal::InputOutput, None) => PAIR,
+        (Goal::InputOutput, Some(_)) => AXIS,
         _ => DECAYS,
     }
 }
 
-/// The line of the `params` of the stage `diagnosis`; none where its defaults hold.
-pub fn params(choice: &Choice<'_>) -> Option<String> {
+/// The line of the `params` of the stage `diagnosis` of an axis; none of others, whose config has them.
+pub fn axis_params(choice: &Choice<'_>) -> Option<String> {
     let reference = choice.diagnosis.as_ref()?.reference?;
     let text = |text: &str| Value::String(text.to_owned());
     let unit = choice.inputs.get(1).map(|drive| drive.unit.as_str()).filter(|unit| !unit.is_empty());
     let mut params = Table::new();
-    params.insert("reference".to_owned(), text(&reference.location));
+    // as the stage names the channels
+    params.insert("reference".to_owned(), text(reference.location.trim_start_matches('/')));
     params.insert("drive_scale".to_owned(), Value::Float(1.0));
     params.insert("force_unit".to_owned(), text(unit.unwrap_or("1")));
     Some(format!("params = {}\n", Value::Table(params)))
 }
 
-/// What `io.columns` has to state for a diagnosis: the samples that are compared, and that positions of an axis stay what
-/// they are.
+/// What `io.columns` has to state for a diagnosis: the samples that are learnt from, and that positions of an axis stay
+/// what they are.
 pub fn stretches(diagnosed: &Diagnosed<'_>, params: &mut Table) {
     let number = |number: usize| Value::Integer(i64::try_from(number).unwrap_or(i64::MAX));
-    let stretch = |first: usize, end: usize| Value::Array(vec![number(first), number(end)]);
-    if let Some(samples) = diagnosed.samples.as_ref().filter(|samples| samples.len() > 1) {
-        let last = samples.end - 1;
-        params.insert("identification".to_owned(), stretch(samples.start, last));
-        params.insert("verification".to_owned(), stretch(last, samples.end));
+    let stretch = |range: &Range<usize>| Value::Array(vec![number(range.start), number(range.end)]);
+    if let Some([learnt, rest]) = &diagnosed.stretches {
+        params.insert("identification".to_owned(), stretch(learnt));
+        params.insert("verification".to_owned(), stretch(rest));
     }
     if diagnosed.reference.is_some() {
         params.insert("remove".to_owned(), Value::String("none".to_owned()));

@@ -70,9 +70,11 @@ impl Choice<'_> {
         if self.frequencies.is_some() {
             return (include_str!("../../configs/thermal-spectrum.toml"), "io.spectrum");
         }
+        if let Some(diagnosed) = &self.diagnosis {
+            let reader = if self.inputs.is_empty() { "io.records" } else { "io.columns" };
+            return (diagnosis_config::template(self.goal, diagnosed), reader);
+        }
         match (self.goal, self.inputs.is_empty()) {
-            (Goal::InputOutput, _) if self.diagnosis.is_some() => (diagnosis_config::template(self.goal), "io.columns"),
-            _ if self.diagnosis.is_some() => (diagnosis_config::template(self.goal), "io.records"),
             (Goal::Frf, false) => (include_str!("../../configs/hammer.toml"), "io.columns"),
             (Goal::Frf, true) => (self.goal.config(), "io.frf"),
             (Goal::InputOutput, _) => (self.goal.config(), "io.columns"),
@@ -125,8 +127,8 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
         match line.split_once(" = ") {
             Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.name())),
             Some(("params", _)) if stage == reader => text.push_str(&params),
-            Some(("params", _)) if stage == "\"diagnosis.causes\"" => {
-                text.push_str(&diagnosis_config::params(choice).unwrap_or_default());
+            Some(("params", old)) if stage == "\"diagnosis.causes\"" => {
+                text.push_str(&diagnosis_config::axis_params(choice).unwrap_or_else(|| format!("params = {old}\n")));
             }
             // the band is one of its data
             Some(("params", _)) if stage == "\"spectrum.thermal\"" => {}

@@ -5,15 +5,17 @@ use afmid_stages::diagnosis::{Diagnosis, Gain, NamedCause, RunnerUp, Value, Verd
 
 use super::number::{number, with_std};
 
-/// Sentences of evidence that are shown: the result has all.
-const MOST_EVIDENCE: usize = 2;
+/// Sentences of evidence, and candidates that are near, which are shown: the page has all.
+const MOST: usize = 3;
 
 /// Verdict, named causes, what is left, the next measurement; what is unknown is left out.
 pub fn verdict_lines(answer: &Diagnosis) -> Vec<String> {
     let mut lines = vec![verdict(answer)];
     lines.extend(answer.causes.iter().map(cause));
     if !answer.nearest.is_empty() {
-        lines.push(format!("nearest: {}", listed(answer.nearest.iter().map(runner_up))));
+        let others = answer.nearest.len().saturating_sub(MOST);
+        let others = (others > 0).then(|| format!("{others} more"));
+        lines.push(format!("nearest: {}", listed(answer.nearest.iter().take(MOST).map(runner_up).chain(others))));
     }
     lines.extend(validation(answer));
     lines.extend(evidence(answer));
@@ -72,22 +74,27 @@ fn gain(gain: &Gain) -> String {
 fn validation(answer: &Diagnosis) -> Option<String> {
     let part = |part: &afmid_stages::diagnosis::Validation| {
         let unit = if part.unit == "1" { String::new() } else { format!(" {}", part.unit) };
-        Some(format!(
-            "{} {} -> {}{unit}",
-            part.name,
-            four_digits(part.rms_before?),
-            four_digits(part.rms_after?)
-        ))
+        Some(format!("{} {} -> {}{unit}", part.name, four_digits(part.rms_before?), four_digits(part.rms_after?)))
     };
     let parts: Vec<String> = answer.validation.iter().filter_map(part).collect();
     (!parts.is_empty()).then(|| format!("error of linear and extended model: {}", parts.join(", ")))
 }
 
+/// What gave the causes away or remains, without the steps that the lines of causes and candidates have.
 fn evidence(answer: &Diagnosis) -> Vec<String> {
-    let shown = answer.evidence.iter().take(MOST_EVIDENCE);
-    let mut lines: Vec<String> = shown.map(|sentence| format!("evidence: {sentence}")).collect();
-    if answer.evidence.len() > MOST_EVIDENCE {
-        lines.push(format!("  and {} sentences more: on the page", answer.evidence.len() - MOST_EVIDENCE));
+    let ids: Vec<&str> = answer
+        .causes
+        .iter()
+        .map(|cause| &cause.id[..])
+        .chain(answer.nearest.iter().map(|other| &other.id[..]))
+        .collect();
+    let is_step = |sentence: &&String| ids.iter().any(|id| sentence.starts_with(&format!("{id} lowers ")));
+    let sentences: Vec<&String> = answer.evidence.iter().filter(|sentence| !is_step(sentence)).collect();
+    let mut lines: Vec<String> = sentences.iter().take(MOST).map(|sentence| format!("evidence: {sentence}")).collect();
+    match sentences.len().saturating_sub(MOST) {
+        0 => {}
+        1 => lines.push("  1 more sentence is on the page".to_owned()),
+        more => lines.push(format!("  {more} more sentences are on the page")),
     }
     lines
 }
@@ -124,5 +131,65 @@ fn listed(items: impl Iterator<Item = String>) -> String {
         None => "nothing".to_owned(),
         Some((last, [])) => last.clone(),
         Some((last, rest)) => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value as Json, json};
+
+    use super::*;
+
+    fn lines(changes: Json) -> Vec<String> {
+        let mut answer = json!({
+            "verdict": "clean", "p_value": null, "baseline": { "adequate": true, "order": 2, "parameters": {}, "noise_rms": null,
+            "distortion_rms": null }, "causes": [], "evidence": [], "nearest": [], "modes_before": [], "modes_after": [],
+            "validation": [], "ladder": [], "false_alarm_rate": 0.01
+        });
+        let of = |value: Json| value.as_object().cloned().unwrap_or_default();
+        answer.as_object_mut().expect("an object").extend(of(changes));
+        verdict_lines(&serde_json::from_value(answer).expect("a diagnosis"))
+    }
+
+    #[test]
+    fn every_number_has_its_error_and_what_is_unknown_is_left_out() {
+        assert_eq!(
+            lines(json!({})),
+            ["clean: the linear model holds as far as these data can tell (false-alarm rate 0.01)"]
+        );
+        let named = json!({
+            "verdict": "named", "p_value": 1.234e-9,
+            "causes": [{ "id": "duffing", "class": ["duffing", "quintic-stiffness"], "p_value": 1e-9,
+                "parameters": { "k3": { "value": 0.6, "std": 0.004, "unit": "1/V^2" } },
+                "gain": { "rms_before": 0.041_234, "rms_after": 0.001, "unit": "V", "log_likelihood": 812.4, "held_out": "8 folds" },
+                "runner_up": { "id": "quintic-stiffness", "share_of_gain": 0.99 }, "next_measurement": "drive it twice as far" }],
+            "evidence": ["duffing lowers the error from 0.04 to 0.001 V", "a", "b", "c", "d"],
+            "validation": [{ "name": "test", "rms_before": 0.2, "rms_after": null, "unit": "V" }]
+        });
+        assert_eq!(
+            lines(named),
+            [
+                "named: duffing (p = 1.2e-9 where nothing is wrong, false-alarm rate 0.01)",
+                "  duffing: k3 0.6000(40) 1/V^2; error 0.04123 -> 0.001 V held out (8 folds); or quintic-stiffness",
+                "evidence: a",
+                "evidence: b",
+                "evidence: c",
+                "  1 more sentence is on the page",
+                "next measurement: drive it twice as far",
+            ]
+        );
+    }
+
+    #[test]
+    fn where_nothing_is_named_the_nearest_say_what_to_measure() {
+        let nearest: Vec<Json> = ["coulomb-friction", "offset", "duffing", "creep", "backlash"]
+            .iter()
+            .map(|id| json!({ "id": id, "share_of_gain": 0.5 }))
+            .collect();
+        let lines = lines(json!({ "verdict": "unexplained", "p_value": 0.0, "nearest": nearest }));
+        assert!(lines[0].contains("p = 0 (below 1e-300)"), "{lines:?}");
+        let shares = "coulomb-friction (50 % of the gain), offset (50 % of the gain), duffing (50 % of the gain)";
+        assert_eq!(lines[1], format!("nearest: {shares} and 2 more"));
+        assert!(lines[2].starts_with("next measurement: let it ring until it stops"), "{lines:?}");
     }
 }
