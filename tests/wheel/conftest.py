@@ -22,6 +22,14 @@ def afmid_cli(tmp_path_factory):
     return run
 
 
+@pytest.fixture(autouse=True, scope="session")
+def fresh_cache(tmp_path_factory):
+    """No result of an earlier build with stages of the same versions, whatever is kept on this machine."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AFMID_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def in_a_folder(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

@@ -17,7 +17,7 @@ use crate::artifacts::{Decays, shape_array};
 use crate::events::DECAYS;
 use crate::watched::watch;
 use afmid_kernels::ringdown::{
-    ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, Motion, follow_channels,
+    ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, ModesWanted, Motion, follow_channels, follow_fitted,
 };
 
 /// Fits modes and mode shapes to free decays: one set of poles for all channels of all hits.
@@ -31,8 +31,8 @@ use afmid_kernels::ringdown::{
 /// of its amplitude, of terms that the data choose (1, a, a^2, a^4, log a, 1/a), against as many exponentials as its line
 /// needs: where the laws hold it is one row with the values at the smallest amplitude reached; where no law holds, the
 /// last part counts.
-/// Of several hits each is fitted by itself first: hits without a mode in common are of unlike systems, and those of one
-/// of them (`system`) are fitted.
+/// Of several hits each is fitted by itself too, from the modes of all where those explain it: hits without a mode in
+/// common are of unlike systems, and those of one of them (`system`) are fitted.
 /// Shapes: `modes` by row, ascending; `shapes` over mode and channel with the modal assurance criterion over mode and
 /// mode; `hits` a row per hit and mode; `course` rows of each mode, from both parts or along its amplitude; `systems` a
 /// row per hit; `fit` over channel and time of the largest hit.
@@ -112,7 +112,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 11,
+        version: 12,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
@@ -129,8 +129,12 @@ impl Stage for DecayFit {
         let whole = self.part == FittedPart::Whole;
         let options = ChannelOptions { missing: decays.missing(), ..self.options(cx) };
         let motion = if whole { Motion::Whole } else { Motion::Laws };
-        let mut followed = follow_channels(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options, motion)
-            .map_err(StageError::from_error)?;
+        let interval_s = 1.0 / decays.sample_rate_hz;
+        let followed = match systems.joint() {
+            Some(all) => follow_fitted(all, &decays.hits, &decays.quiet, interval_s, &options, motion),
+            None => follow_channels(&decays.hits, &decays.quiet, interval_s, &options, motion),
+        };
+        let mut followed = followed.map_err(StageError::from_error)?;
         followed.add_error_of_rate(decays.rate_relative_std);
         let parts = Parts::new(&followed, &decays, motion);
         let fit = &followed.fit;

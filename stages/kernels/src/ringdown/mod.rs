@@ -101,7 +101,7 @@ pub(crate) mod internals {
 pub use channels::{
     AmplitudeCourse, ChannelNoise, ChannelOptions, ChannelRingdown, Dropped, DroppedMode, FollowedDecay, HarmonicOf,
     HitSystems, MOVES, ModeCourse, ModeShape, ModesWanted, Motion, OrderTried, RankOne, RecordFit, ShapePoint,
-    fit_channels, follow_channels, hit_systems,
+    fit_channels, follow_channels, follow_fitted, hit_systems,
 };
 pub use choice::{CountedRingdown, HELD_OUT_EVENTS, ModeCount, fit_counted_ringdowns};
 pub use decay::{Decay, DecayOptions, fit_decay};

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::course::digits;
 use crate::artifacts::Decays;
-use afmid_kernels::ringdown::{ChannelOptions, Estimate, HitSystems, ModeEstimate, hit_systems};
+use afmid_kernels::ringdown::{ChannelOptions, ChannelRingdown, Estimate, HitSystems, ModeEstimate, hit_systems};
 
 /// Hits that a warning names of each system.
 const MOST_NAMED: usize = 5;
@@ -29,7 +29,7 @@ impl Systems {
     pub fn of(decays: &Decays<'_>, options: &ChannelOptions) -> Self {
         let options = ChannelOptions { missing: decays.missing(), ..options.clone() };
         let found = match decays.hits.len() {
-            1 => HitSystems { strongest: Vec::new(), systems: vec![vec![0]] },
+            1 => HitSystems { strongest: Vec::new(), systems: vec![vec![0]], joint: None },
             _ => hit_systems(&decays.hits, &decays.quiet, 1.0 / decays.sample_rate_hz, &options),
         };
         Self { found, numbers: decays.numbers.clone() }
@@ -43,6 +43,11 @@ impl Systems {
         })?;
         decays.keep(hits);
         Ok(())
+    }
+
+    /// Fit of all hits together, where they are of one system.
+    pub fn joint(&self) -> Option<&ChannelRingdown> {
+        self.found.joint.as_ref()
     }
 
     /// What to say of several systems.

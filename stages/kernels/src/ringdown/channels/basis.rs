@@ -88,14 +88,17 @@ pub(super) fn signal(poles: &Poles, own: &[f64], interval_s: f64, samples: usize
     let centre = 0.5 * (samples.max(2) - 1) as f64;
     let slope = if drift { own[2 * modes + 1] } else { 0.0 };
     let mut out: Vec<f64> = (0..samples).map(|k| own[2 * modes] + slope * (k as f64 - centre) / centre).collect();
-    for (j, pole) in poles.0.iter().enumerate() {
-        let step = (pole * interval_s).exp();
-        let mut z = c64::new(own[2 * j], own[2 * j + 1]);
-        for value in &mut out {
+    let step = |pole: &c64| (pole * interval_s).exp();
+    let mut turning: Vec<(c64, c64)> =
+        poles.0.iter().zip(own.chunks_exact(2)).map(|(pole, z)| (c64::new(z[0], z[1]), step(pole))).collect();
+    for value in &mut out {
+        // side by side: each waits for its own last product alone
+        for (z, step) in &mut turning {
             *value += z.re;
-            z *= step;
+            *z *= *step;
+            // below every rounding nothing is left to add, and denormal numbers are slow
             if z.norm_sqr() < 1e-200 {
-                break;
+                *z = c64::new(0.0, 0.0);
             }
         }
     }

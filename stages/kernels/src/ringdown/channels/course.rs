@@ -134,9 +134,29 @@ pub fn follow_channels(
     options: &ChannelOptions,
     motion: Motion,
 ) -> Result<FollowedDecay, ModelError> {
-    let all = fit_channels(events, free, interval_s, options)?;
+    follow_fitted(&fit_channels(events, free, interval_s, options)?, events, free, interval_s, options, motion)
+}
+
+/// [`follow_channels`] from `all`, what [`fit_channels`] gave for the same decays and options.
+///
+/// # Shapes
+/// As [`fit_channels`].
+/// # Units
+/// As [`fit_channels`].
+/// # Errors
+/// Those of [`follow_channels`].
+/// # Source
+/// As [`follow_channels`].
+pub fn follow_fitted(
+    all: &ChannelRingdown,
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+    motion: Motion,
+) -> Result<FollowedDecay, ModelError> {
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
-    let records = LawFit { all: &all, events, interval_s, options };
+    let records = LawFit { all, events, interval_s, options };
     let linear = |one_line: &[OneLine]| follow_linear(&records, free, (fixed, motion == Motion::Whole), one_line);
     if fixed || motion != Motion::Laws {
         return linear(&[]);
@@ -210,7 +230,11 @@ fn follow_linear(
 
 /// Fitted exponentials that are no modes, by number: lines that do not die away, what has no maximum in its response or
 /// dies away at once. Errors: all are.
-fn no_modes(all: &ChannelRingdown, interval_s: f64, samples: usize) -> Result<Vec<(usize, DroppedMode)>, ModelError> {
+pub(super) fn no_modes(
+    all: &ChannelRingdown,
+    interval_s: f64,
+    samples: usize,
+) -> Result<Vec<(usize, DroppedMode)>, ModelError> {
     let (still, wide, short) = (steady(all, samples as f64 * interval_s), broad(all), brief(all, interval_s));
     let modes = all.modes();
     let reason = |j: usize| match [&still, &wide, &short].map(|numbers| numbers.contains(&j)) {

@@ -29,7 +29,7 @@ pub struct AmplitudeCourse {
 const FIRST_PARTS: [f64; 3] = [0.6, 0.35, 0.2];
 
 /// Half widths (of both together) within which lines are fitted together: what one lacks, the others explain.
-const TOGETHER: f64 = 6.0;
+pub(super) const TOGETHER: f64 = 6.0;
 /// The same within which two modes may be one that moves.
 const ONE_LINE: f64 = 2.5;
 /// Relative distance from a multiple of another line up to which a line is looked at with it.
@@ -190,8 +190,7 @@ impl<'a> LawFit<'a> {
 
     /// One turn more or less within the longest record, rad/s.
     pub fn resolution(&self) -> f64 {
-        let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(1);
-        TAU / (longest as f64 * self.interval_s)
+        resolution(self.events, self.interval_s)
     }
 
     /// The rows of the table as these lines want them.
@@ -283,8 +282,11 @@ impl<'a> LawFit<'a> {
         rows.take_laws(tag, mode, line.lack.factor);
         let beside = line.modes.get(1).filter(|other| line.follows == Follows::Beside && rings(other));
         if let Some(other) = beside {
-            let tag = rows.restored(strongest);
-            rows.take_linear(tag, other, line.lack.factor);
+            let second = rows.restored(strongest);
+            rows.take_linear(second, other, line.lack.factor);
+            if let Some(mac) = left_by(other, mode) {
+                rows.drop_row(second, Dropped::Companion { of: tag, mac });
+            }
         }
         Some(tag)
     }
@@ -320,6 +322,30 @@ fn widened(mut line: FollowedLine) -> FollowedLine {
         }
     }
     line
+}
+
+/// The modal assurance criterion of a linear mode and one that follows laws, where it is what their laws leave of that
+/// mode's motion: in its line, of its shape, and faster. None where it is a mode.
+///
+/// Why faster by any factor: laws take the terms that die away twice as fast, and leave what turns on while they do.
+fn left_by(other: &FollowedMode, main: &FollowedMode) -> Option<f64> {
+    let (own, low) = (other.course.first()?, main.course.first()?);
+    let rate_hz = |at: &CoursePoint| at.frequency_hz.value * at.damping_ratio.value;
+    let near = |at: &CoursePoint| (at.frequency_hz.value - own.frequency_hz.value).abs() < rate_hz(own);
+    let (cross, one, two) = other.shape.iter().zip(&main.shape).fold((c64::new(0.0, 0.0), 0.0, 0.0), |sum, (a, b)| {
+        (sum.0 + a.conj() * b, sum.1 + a.norm_sqr(), sum.2 + b.norm_sqr())
+    });
+    let mac = cross.norm_sqr() / (one * two);
+    (rate_hz(own) > rate_hz(low) && main.course.iter().any(near) && mac > ONE_SHAPE).then_some(mac)
+}
+
+/// Modal assurance criterion of one shape, at least.
+const ONE_SHAPE: f64 = 0.95;
+
+/// One turn more or less within the longest record, rad/s.
+pub(super) fn resolution(events: &[Vec<&[f64]>], interval_s: f64) -> f64 {
+    let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(1);
+    TAU / (longest as f64 * interval_s)
 }
 
 /// Whether a line is about a multiple of another, which may move.

@@ -130,6 +130,26 @@ fn a_mode_that_seems_steady_is_a_row_where_its_motion_shows_that_it_dies() {
 }
 
 #[test]
+fn a_short_part_of_a_decay_with_drag_is_one_row() {
+    for seed in 0..12_u64 {
+        let s = seed as f64;
+        let f = 15.0 * 1.3_f64.powf(s);
+        let interval_s = 1.0 / (RATE * f);
+        // half of the amplitude is lost: terms of the drag and others are much alike over it, and two exponentials, too
+        let mover = Oscillator { frequency_hz: f, damping: 0.003, cubic: 0.2 * (s % 2.0), drag: 0.004 + 3e-4 * s };
+        let decay = mover.decay(0.3, interval_s, (RATE * (24.0 + s)) as usize);
+        let found = followed(&hits(&[(vec![decay], &[1.0])], 1e-3, 70 + seed), interval_s).expect("a fit");
+        let modes = found.fit.modes();
+        assert!(modes.len() == 1, "seed {seed}: {modes:?}");
+        let quality = modes[0].quality_factor;
+        let ends = [mover.at(0.3).1, mover.at(0.1).1].map(|damping| 0.5 / damping);
+        let (least, most) = (ends[0] - 3.0 * quality.std, ends[1] + 3.0 * quality.std);
+        assert!((0.9 * least..1.1 * most).contains(&quality.value), "seed {seed}: {quality:?}, {ends:?}");
+        assert!(quality.std < 0.1 * quality.value, "seed {seed}: {quality:?}");
+    }
+}
+
+#[test]
 fn errors_of_a_mode_that_follows_no_law_count_what_it_moves() {
     for seed in 0..6_u64 {
         let (f, interval_s, samples) = (100.0, 1.0 / 2000.0, 3000);

@@ -37,7 +37,7 @@ mod systems_tests;
 mod tests;
 
 pub use companions::{Dropped, DroppedMode, HarmonicOf};
-pub use course::{FollowedDecay, MOVES, ModeCourse, Motion, follow_channels};
+pub use course::{FollowedDecay, MOVES, ModeCourse, Motion, follow_channels, follow_fitted};
 pub use laws::AmplitudeCourse;
 pub use options::{ChannelNoise, ChannelOptions, ModesWanted};
 pub use order::fit_channels;

@@ -77,6 +77,34 @@ pub fn fit_channels(
     ChannelRingdown::of(&records, ladder.refined(step), seen)
 }
 
+/// The fit from the poles of the options, those left out that the others make up for; none where a mode more explains
+/// more than chance does, or noise alone as much as the last.
+pub(super) fn explained(
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+) -> Option<ChannelRingdown> {
+    let records = Records::of(events, interval_s, options).ok()?;
+    let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
+    let mut tried = Vec::new();
+    let step = ladder.pruned(ladder.given(), &mut tried);
+    let lasts = |step: &Step| step.fitted.poles.0.last().copied();
+    let silent = || {
+        let none = ladder.mark(&ladder.settled(ladder.weighed(&Poles(Vec::new()), &step.weights)));
+        lasts(&step).is_none_or(|place| ladder.by_chance(ladder.gain(&none, &step, &[place]), 1))
+    };
+    if step.fitted.poles.0.len() < 2 && silent() {
+        return None;
+    }
+    if let Some(more) = ladder.next(&step, None, false)
+        && lasts(&more).is_some_and(|place| !ladder.by_chance(ladder.gain(&ladder.mark(&step), &more, &[place]), 1))
+    {
+        return None;
+    }
+    ChannelRingdown::of(&records, ladder.refined(step), tried).ok()
+}
+
 /// A fit with its noise.
 struct Step {
     fitted: Fitted,

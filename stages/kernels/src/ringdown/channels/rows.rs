@@ -108,7 +108,8 @@ impl<'a> Rows<'a> {
         self.of_poles(own).into_iter().for_each(|tag| self.drop_row(tag, reason));
     }
 
-    fn drop_row(&mut self, tag: usize, reason: Dropped) {
+    /// A row is no mode.
+    pub fn drop_row(&mut self, tag: usize, reason: Dropped) {
         let Some(at) = self.place(tag) else { return };
         self.followed.dropped.push(DroppedMode { mode: self.followed.whole.modes()[at], reason });
         self.dropped_from.push(self.from[at]);

@@ -1,10 +1,14 @@
 //! Whether all hits are of one linear system.
 
+use faer::c64;
 use rayon::prelude::*;
 
 use super::companions::energies;
-use super::course::{FAR, MOVES, Motion, follow_channels};
+use super::course::{FAR, MOVES, Motion, follow_channels, no_modes};
+use super::laws::{TOGETHER, resolution};
+use super::lines::near;
 use super::options::{ChannelOptions, ModesWanted};
+use super::order::{explained, fit_channels};
 use super::result::ChannelRingdown;
 use crate::ringdown::ModeEstimate;
 use crate::statistics::chi_square_tail;
@@ -22,12 +26,14 @@ const MOTION: f64 = 2.0;
 const REPEATS: f64 = 2e-3;
 
 /// Hits by the linear systems that they are of.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct HitSystems {
     /// Strongest mode of each hit, fitted by itself; none where it shows none.
     pub strongest: Vec<Option<ModeEstimate>>,
     /// Numbers of the hits of each system, ascending; the system with the most hits first.
     pub systems: Vec<Vec<usize>>,
+    /// Fit of all hits together, where they are of one system and it succeeds.
+    pub joint: Option<ChannelRingdown>,
 }
 
 /// A hit's modes by itself.
@@ -45,7 +51,9 @@ struct Alone {
 /// # Model
 /// As [`fit_channels`](super::fit_channels), for the hits of each system; a system has modes of its own.
 /// # Method
-/// Each hit is fitted by itself, six modes at most. From the one with the most energy on, each joins the first system
+/// All hits are fitted together, then each by itself from those modes, what it lacks left out. Where two of those lie
+/// near each other, or hits do not share a mode, each is fitted from nothing, as is a hit that more than noise is left
+/// of, six modes at most. From the one with the most energy on, each joins the first system
 /// with whose first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
 /// mode unless their difference has a probability below 0.001 over the number of hits, and exceeds what one linear mode
 /// can stand for (a tenth of the half width to either side, of damped modes two thousandths of the frequency at most), or
@@ -63,50 +71,102 @@ pub fn hit_systems(
     interval_s: f64,
     options: &ChannelOptions,
 ) -> HitSystems {
-    let alone: Vec<Option<Alone>> =
-        (0..events.len()).into_par_iter().map(|hit| Alone::of(&events[hit], hit, free, interval_s, options)).collect();
+    let joint = fit_channels(events, free, interval_s, options).ok();
+    let of = |hit: usize| Hit { event: &events[hit], hit, free, interval_s, options };
+    let quick = |poles: &[c64]| -> Vec<Option<Alone>> {
+        let alone = |hit| Alone::explained(&of(hit), poles).or_else(|| Alone::of(&of(hit)));
+        (0..events.len()).into_par_iter().map(alone).collect()
+    };
+    if let Some(all) = joint.as_ref().filter(|all| apart(&all.poles, interval_s, events)) {
+        let alone = quick(&all.poles);
+        let systems = grouped(&alone);
+        if systems.len() == 1 {
+            return HitSystems { strongest: strongest(&alone), systems, joint };
+        }
+    }
+    let alone: Vec<Option<Alone>> = (0..events.len()).into_par_iter().map(|hit| Alone::of(&of(hit))).collect();
+    let systems = grouped(&alone);
+    let joint = joint.filter(|_| systems.len() == 1);
+    HitSystems { strongest: strongest(&alone), systems, joint }
+}
+
+/// Whether no two lines are near each other: together they may stand for another damping, or for a motion.
+fn apart(poles: &[c64], interval_s: f64, events: &[Vec<&[f64]>]) -> bool {
+    let resolution = resolution(events, interval_s);
+    poles.iter().enumerate().all(|(i, a)| poles[..i].iter().all(|b| !near(*a, *b, TOGETHER, resolution)))
+}
+
+fn strongest(alone: &[Option<Alone>]) -> Vec<Option<ModeEstimate>> {
+    alone.iter().map(|own| own.as_ref().map(|own| own.modes[own.strongest])).collect()
+}
+
+/// Numbers of the hits of each system.
+fn grouped(alone: &[Option<Alone>]) -> Vec<Vec<usize>> {
     let mut order: Vec<(usize, &Alone)> =
         alone.iter().enumerate().filter_map(|(hit, own)| own.as_ref().map(|own| (hit, own))).collect();
     order.sort_by(|a, b| b.1.energy.total_cmp(&a.1.energy).then(a.0.cmp(&b.0)));
     let mut systems: Vec<(&Alone, Vec<usize>)> = Vec::new();
     for (hit, own) in order {
-        match systems.iter_mut().find(|(first, _)| first.shares_mode(own, events.len())) {
+        match systems.iter_mut().find(|(first, _)| first.shares_mode(own, alone.len())) {
             Some((_, hits)) => hits.push(hit),
             None => systems.push((own, vec![hit])),
         }
     }
     let mut systems: Vec<Vec<usize>> = systems.into_iter().map(|(_, hits)| hits).collect();
     systems.sort_by_key(|hits| std::cmp::Reverse(hits.len()));
-    let silent = (0..events.len()).filter(|&hit| alone[hit].is_none());
+    let silent = (0..alone.len()).filter(|&hit| alone[hit].is_none());
     match systems.first_mut() {
         Some(first) => first.extend(silent),
         None => systems.push(silent.collect()),
     }
     systems.iter_mut().for_each(|hits| hits.sort_unstable());
-    let strongest = alone.iter().map(|own| own.as_ref().map(|own| own.modes[own.strongest])).collect();
-    HitSystems { strongest, systems }
+    systems
+}
+
+/// A hit and how it is fitted.
+struct Hit<'a> {
+    event: &'a [&'a [f64]],
+    hit: usize,
+    free: &'a [Vec<&'a [f64]>],
+    interval_s: f64,
+    options: &'a ChannelOptions,
+}
+
+impl Hit<'_> {
+    fn options(&self, start: &[c64]) -> ChannelOptions {
+        let missing = self.options.missing.get(self.hit).map(|gaps| vec![gaps.clone()]).unwrap_or_default();
+        let (modes, start) = (ModesWanted::AtMost(MODES), start.to_vec());
+        ChannelOptions { modes, missing, start, ..self.options.clone() }
+    }
 }
 
 impl Alone {
-    fn of(
-        event: &[&[f64]],
-        hit: usize,
-        free: &[Vec<&[f64]>],
-        interval_s: f64,
-        options: &ChannelOptions,
-    ) -> Option<Self> {
-        let missing = options.missing.get(hit).map(|gaps| vec![gaps.clone()]).unwrap_or_default();
-        let options = ChannelOptions { modes: ModesWanted::AtMost(MODES), missing, ..options.clone() };
-        let followed = follow_channels(&[event.to_vec()], free, interval_s, &options, Motion::Whole).ok()?;
-        let fit = followed.whole;
-        let modes = fit.modes();
-        let mut motion = vec![0.0; modes.len()];
+    /// From nothing.
+    fn of(hit: &Hit<'_>) -> Option<Self> {
+        let options = hit.options(&hit.options.start);
+        let event = [hit.event.to_vec()];
+        let followed = follow_channels(&event, hit.free, hit.interval_s, &options, Motion::Whole).ok()?;
+        let mut motion = vec![0.0; followed.whole.poles.len()];
         for course in followed.course.iter().filter(|course| course.moves) {
             motion[course.mode] = (course.last.pole() - course.first.pole()).norm();
         }
+        Self::with(followed.whole, motion)
+    }
+
+    /// From the modes of all hits; none where they leave more than noise.
+    fn explained(hit: &Hit<'_>, poles: &[c64]) -> Option<Self> {
+        let longest = hit.event.iter().map(|row| row.len()).max().unwrap_or(0);
+        let all = explained(&[hit.event.to_vec()], hit.free, hit.interval_s, &hit.options(poles))?;
+        let gone: Vec<usize> = no_modes(&all, hit.interval_s, longest).ok()?.iter().map(|(j, _)| *j).collect();
+        let fit = all.without(&gone);
+        let still = vec![0.0; fit.poles.len()];
+        Self::with(fit, still)
+    }
+
+    fn with(fit: ChannelRingdown, motion: Vec<f64>) -> Option<Self> {
         let energies = energies(&fit);
         let strongest = (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]))?;
-        Some(Self { energy: energies[strongest], fit, modes, motion, strongest })
+        Some(Self { energy: energies[strongest], modes: fit.modes(), fit, motion, strongest })
     }
 
     fn shares_mode(&self, other: &Self, hits: usize) -> bool {

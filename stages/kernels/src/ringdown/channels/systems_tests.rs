@@ -29,7 +29,9 @@ fn hit(modes: &[Mode], noise: f64, seed: u64) -> Vec<f64> {
 
 fn found(hits: &[Vec<f64>]) -> Vec<Vec<usize>> {
     let events: Vec<Vec<&[f64]>> = hits.iter().map(|hit| vec![&hit[..]]).collect();
-    hit_systems(&events, &[], INTERVAL_S, &ChannelOptions::default()).systems
+    let found = hit_systems(&events, &[], INTERVAL_S, &ChannelOptions::default());
+    assert_eq!(found.joint.is_some(), found.systems.len() == 1);
+    found.systems
 }
 
 /// Numbers between 0 and 1 that look drawn.
@@ -73,6 +75,18 @@ fn hits_of_unlike_systems_are_parted() {
         let which = [0, 1, 0, 2, 0, 1];
         let hits: Vec<Vec<f64>> = (0..6).map(|h| hit(&[systems[which[h]]], 0.01, 17 * seed + h as u64)).collect();
         assert_eq!(found(&hits), [vec![0, 2, 4], vec![1, 5], vec![3]], "seed {seed}");
+    }
+}
+
+#[test]
+fn hits_of_two_systems_that_both_show_a_line_of_the_mains_are_parted() {
+    // steady and stronger than the ringing: all hits share it, and it is no mode
+    let line = Mode(50.0, 1e-7, 0.3, 0.0);
+    for seed in 0..6 {
+        let hits: Vec<Vec<f64>> = (0..4)
+            .map(|h| hit(&[Mode([120.0, 133.0][h % 2], 0.004, 0.2, 0.0), line], 0.003, 7 * seed + h as u64))
+            .collect();
+        assert_eq!(found(&hits), [vec![0, 2], vec![1, 3]], "seed {seed}");
     }
 }
 

@@ -24,6 +24,8 @@ const EXPLAINED: f64 = 0.95;
 /// spring, the sine of an angle, a spring of a power law.
 const OF_DAMPING: [Term; 3] = [Term::Linear, Term::Square, Term::Inverse];
 const OF_FREQUENCY: [&[Term]; 3] = [&[Term::Square], &[Term::Square, Term::Fourth], &[Term::Log]];
+/// Difference of BIC up to which laws of one cause are as good as others: odds of 20 to 1.
+const AS_GOOD: f64 = 6.0;
 /// Difference of BIC from which on exponentials replace a mode that leaves no more than noise.
 const DECISIVE: f64 = 10.0;
 /// Gain of BIC from which on a linear mode stands beside one that moves.
@@ -127,6 +129,29 @@ impl Search<'_> {
         best
     }
 
+    /// The same with laws of one cause in a mode that leaves noise alone, where they are as good: over a small part of a
+    /// decay terms are much alike.
+    fn of_one_cause(&self, best: &Fit, number: usize) -> Option<Fit> {
+        let mode = &best.modes[number];
+        let law = |terms: &[Term]| terms.iter().fold(Law::constant(0.0), |law, term| law.with(*term));
+        let choices = |old: &Law, of_cause: &[&[Term]]| -> Vec<Law> {
+            let as_many = |terms: &&&[Term]| terms.len() < old.terms.len();
+            let others = of_cause.iter().filter(as_many).filter_map(|terms| projected(old, law(terms), mode));
+            std::iter::once(old.clone()).chain(others).collect()
+        };
+        let damping = choices(&mode.damping, &OF_DAMPING.each_ref().map(std::slice::from_ref));
+        let frequency = choices(&mode.frequency, &OF_FREQUENCY);
+        let both = damping.iter().flat_map(|d| frequency.iter().map(move |f| (d.clone(), f.clone())));
+        let modes = both.map(|(damping, frequency)| Mode { damping, frequency, ..mode.clone() });
+        let fits = modes.filter(|mode| is_of_one_cause(mode) && !self.problem.is_spent()).filter_map(|mode| {
+            let mut modes = best.modes.clone();
+            modes[number] = mode;
+            fit(&self.problem, modes)
+        });
+        let found = fits.min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))?;
+        (self.bic(&found) < self.bic(best) + AS_GOOD && self.lack(&found, number).factor <= 1.0).then_some(found)
+    }
+
     /// Each line that moves, has companions or leaves more than noise, as sums of exponentials instead, or with a
     /// linear mode beside.
     pub(crate) fn alternatives(&self, start: Fit, of_lines: &mut [OfLine]) -> Fit {
@@ -137,6 +162,9 @@ impl Search<'_> {
             let lacks = left.factor > 1.0;
             if self.problem.is_spent() || !best.modes[number].moves() && self.lines[line].poles.len() < 2 && !lacks {
                 continue;
+            }
+            if !lacks && !is_of_one_cause(&best.modes[number]) {
+                best = self.of_one_cause(&best, number).unwrap_or(best);
             }
             let own = self.bic(&best);
             let mode = &best.modes[number];
