@@ -27,9 +27,13 @@ pub fn diagnosis<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice
     if let Some(reference) = wanted.reference {
         return axis(file, wanted, reference);
     }
+    let several = source.files.len() > 1;
     let looks = match by_looks(file, &Wanted { goal: None, ..*wanted }) {
         Err(_) if is_of_a_lever(source) && wanted.inputs.is_empty() => return releases(source, wanted, String::new()),
-        Ok(looks) if looks.goal == Goal::Thermal && is_of_a_lever(source) => {
+        // one that only shakes, or rings in several records
+        Ok(looks)
+            if is_of_a_lever(source) && (looks.goal == Goal::Thermal || looks.goal == Goal::Steady && several) =>
+        {
             return releases(source, wanted, String::new());
         }
         looks => looks,
@@ -56,16 +60,17 @@ fn releases<'a>(source: &'a Source, wanted: &Wanted<'_>, why: String) -> Result<
 fn is_clear(file: &FirstFile<'_>, looks: Option<&Choice<'_>>) -> bool {
     let signals: Vec<&Channel> = file.source.channels.iter().filter(usable).collect();
     let Some(looks) = looks else { return signals.len() < 2 };
-    if looks.goal == Goal::SnapOff {
+    // input and output ask for themselves
+    if looks.goal == Goal::SnapOff || !looks.inputs.is_empty() {
         return true;
     }
     let taken = |channel: &&&Channel| {
-        let mut all = looks.channels.iter().chain(&looks.inputs).copied().chain(looks.force);
+        let mut all = looks.channels.iter().copied().chain(looks.force);
         all.any(|own| own.location == channel.location)
     };
     let all_taken = signals.iter().filter(taken).count() == signals.len();
-    let is_driven = !looks.inputs.is_empty() || looks.force.is_some();
-    all_taken && (looks.channels.len() < 2 || are_sensors(&looks.channels) && (is_driven || file.hammer().is_none()))
+    let has_hammer = || looks.force.is_none() && file.hammer().is_some();
+    all_taken && (looks.channels.len() < 2 || are_sensors(&looks.channels) && !has_hammer())
 }
 
 /// Whether channels are sensors of one motion by what their author wrote. Numbers of columns are the reader's.
@@ -104,7 +109,9 @@ fn listed(channels: &[&Channel]) -> String {
 /// outputs or files.
 fn forced<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, looks: Choice<'a>) -> Result<Choice<'a>, Question> {
     let source = file.source;
+    let all = outputs(source, wanted, &looks.inputs)?;
     if looks.struck
+        && looks.channels.len() == all.len()
         && let [force] = looks.inputs[..]
         && let (_, found) = file.search(&looks.channels, Some(force), wanted)?
         && !found.decays.is_empty()

@@ -107,18 +107,22 @@ pub const fn template(goal: Goal, diagnosed: &Diagnosed<'_>) -> &'static str {
 pub fn axis_params(choice: &Choice<'_>) -> Option<String> {
     let reference = choice.diagnosis.as_ref()?.reference?;
     let text = |text: &str| Value::String(text.to_owned());
-    let unit = choice.inputs.get(1).map(|drive| drive.unit.as_str()).filter(|unit| !unit.is_empty());
     let mut params = Table::new();
     // as the stage names the channels
     params.insert("reference".to_owned(), text(reference.location.trim_start_matches('/')));
     params.insert("drive_scale".to_owned(), Value::Float(1.0));
-    params.insert("force_unit".to_owned(), text(unit.unwrap_or("1")));
+    params.insert("force_unit".to_owned(), text(drive_unit(choice)));
     Some(format!("params = {}\n", Value::Table(params)))
 }
 
-/// What `io.columns` has to state for a diagnosis: the samples that are learnt from, and that positions of an axis stay
-/// what they are.
-pub fn stretches(diagnosed: &Diagnosed<'_>, params: &mut Table) {
+/// The unit of an axis' drive, the second of its inputs.
+fn drive_unit<'a>(choice: &'a Choice<'_>) -> &'a str {
+    choice.inputs.get(1).map(|drive| drive.unit.as_str()).filter(|unit| !unit.is_empty()).unwrap_or("1")
+}
+
+/// What `io.columns` has to state for a diagnosis: the samples that are learnt from; of an axis the drive's unit, and that
+/// positions stay what they are.
+pub fn stretches(choice: &Choice<'_>, diagnosed: &Diagnosed<'_>, params: &mut Table) {
     let number = |number: usize| Value::Integer(i64::try_from(number).unwrap_or(i64::MAX));
     let stretch = |range: &Range<usize>| Value::Array(vec![number(range.start), number(range.end)]);
     if let Some([learnt, rest]) = &diagnosed.stretches {
@@ -126,6 +130,7 @@ pub fn stretches(diagnosed: &Diagnosed<'_>, params: &mut Table) {
         params.insert("verification".to_owned(), stretch(rest));
     }
     if diagnosed.reference.is_some() {
+        params.insert("input_unit".to_owned(), Value::String(drive_unit(choice).to_owned()));
         params.insert("remove".to_owned(), Value::String("none".to_owned()));
     }
 }

@@ -257,7 +257,7 @@ pub fn columns(
     if let Some(unit) = wanted.unit {
         params.insert("output_unit".to_owned(), text(unit));
     }
-    choice.diagnosis.iter().for_each(|diagnosed| diagnosis_config::stretches(diagnosed, &mut params));
+    choice.diagnosis.iter().for_each(|diagnosed| diagnosis_config::stretches(choice, diagnosed, &mut params));
     Ok(format!("params = {}\n", Value::Table(params)))
 }
 
