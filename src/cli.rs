@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 mod batch;
+mod diagnose;
 mod examples;
 mod export;
 mod new;
@@ -15,9 +16,10 @@ mod provenance;
 mod submit;
 
 pub use batch::{BatchArgs, SetsArgs};
+pub use diagnose::DiagnoseArgs;
 pub use examples::command;
 pub use export::{ExportArgs, ExportFormat, ModelFormat, ShapeFormat};
-pub use new::{Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordsAre};
+pub use new::{Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordingsArgs, RecordsAre};
 pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};
@@ -46,6 +48,9 @@ pub enum Command {
         #[command(subcommand)]
         to: SubmitTo,
     },
+    /// From recordings to a verdict on the linear model: config, result and page are written side by side, the verdict is
+    /// printed.
+    Diagnose(DiagnoseArgs),
     /// Begin something of your own.
     New {
         /// What.
@@ -207,7 +212,13 @@ impl Command {
     pub const fn computes(&self) -> bool {
         matches!(
             self,
-            Self::Run(_) | Self::Batch(_) | Self::Rerun(_) | Self::New { .. } | Self::Inspect { .. } | Self::Exam(_)
+            Self::Run(_)
+                | Self::Batch(_)
+                | Self::Rerun(_)
+                | Self::Diagnose(_)
+                | Self::New { .. }
+                | Self::Inspect { .. }
+                | Self::Exam(_)
         )
     }
 }

@@ -46,6 +46,18 @@ and submit.sh, which sends both. A task succeeds when all its data sets were tri
 faults, submit again: what is finished is not run again.",
     },
     help(&["submit"], &["afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results"]),
+    Help {
+        command: &["diagnose"],
+        examples: &[
+            "afmid diagnose archive/2004",
+            "afmid diagnose hit.csv --rate 5000 --unit m/s^2 -o hit.h5",
+            "afmid diagnose bench.mat --input u --channel y --rate 610 -o bench.h5 --json",
+            "afmid diagnose axis.mat --reference qg --input vir --channel qm --rate 1000 --unit m",
+        ],
+        further: "\
+Looked at are snap-offs of a lever, free decays, a measured input and output, an axis in its control loop (--reference) and a steady oscillation. Written is the config of
+`afmid new pipeline RECORDINGS --goal diagnosis`; change it and `afmid run` it for more: parts to judge on, causes to leave out. Exit codes are those of `run`, whatever the verdict.",
+    },
     help(&["new"], &["afmid new pipeline archive/2004", "afmid new stage end_noise --python"]),
     help(
         &["new", "stage"],
@@ -63,6 +75,7 @@ faults, submit again: what is finished is not run again.",
         &[
             "afmid new pipeline archive/2004 -o levers.toml",
             "afmid new pipeline recordings --goal ringdown --channel '/Group 1/deflection' --rate 5e6 --unit V",
+            "afmid new pipeline bench.mat --goal diagnosis --input u --channel y --rate 610 -o bench.toml",
         ],
     ),
     help(

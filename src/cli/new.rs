@@ -84,12 +84,27 @@ fn stage_name(text: &str) -> Result<String, String> {
 /// For which recordings, and to find what.
 #[derive(Debug, Args)]
 pub struct NewPipelineArgs {
-    /// Recordings: a folder, or files; of several rates or channels those that most are of.
-    #[arg(required = true, value_name = "RECORDINGS")]
-    pub recordings: Vec<PathBuf>,
+    /// The recordings, and what is known of them.
+    #[command(flatten)]
+    pub recordings: RecordingsArgs,
     /// What to find [default: what the recordings look like].
     #[arg(long, value_enum)]
     pub goal: Option<Goal>,
+    /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left
+    /// alone.
+    #[arg(short, long, value_name = "CONFIG.toml")]
+    pub output: Option<PathBuf>,
+    /// What was written, as JSON, alone on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Recordings, and what the user says of them beside what they hold.
+#[derive(Debug, Args)]
+pub struct RecordingsArgs {
+    /// Recordings: a folder, or files; of several rates or channels those that most are of.
+    #[arg(required = true, value_name = "RECORDINGS")]
+    pub paths: Vec<PathBuf>,
     /// The signal, as `afmid inspect` names it; of decays and of a hammer's responses several, one for each sensor
     /// [default: the channel that can carry a ringdown and is named most like a deflection; of decays all channels of
     /// that length and unit].
@@ -100,6 +115,10 @@ pub struct NewPipelineArgs {
     /// at the same time.
     #[arg(long, value_name = "NAME")]
     pub input: Vec<String>,
+    /// Of a diagnosis: the channel that the output is to follow, where a controller makes the input (the drive) from
+    /// both.
+    #[arg(long, value_name = "NAME")]
+    pub reference: Option<String>,
     /// What files and channels are, of decays: hits, or sensors that saw the same hits; of a force and what moves: hits, or
     /// points; of frequency responses: points [default: files are hits, channels are sensors, cells are hits; files with a
     /// force are hits if their names number hits].
@@ -115,13 +134,6 @@ pub struct NewPipelineArgs {
     /// Put samples of a clock that wanders on an even grid by interpolation (docs/archives.md); gaps stay gaps.
     #[arg(long)]
     pub resample: bool,
-    /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left
-    /// alone.
-    #[arg(short, long, value_name = "CONFIG.toml")]
-    pub output: Option<PathBuf>,
-    /// What was written, as JSON, alone on stdout.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// What files and channels are.
@@ -146,7 +158,8 @@ pub enum Goal {
     SnapOff,
     /// Frequencies and quality factors from all snap-offs jointly, no average: the best errors.
     Ringdown,
-    /// What a linear simulation gets wrong, by name.
+    /// What a linear simulation gets wrong, by name: of snap-offs of a lever, decays, input and output, an axis in its
+    /// loop (--reference), a steady oscillation.
     Diagnosis,
     /// The lever in contact beside the free one: snap-ins as well.
     Coupled,

@@ -5,10 +5,12 @@ mod causes;
 mod check;
 mod completions;
 mod consent;
+mod diagnose;
 mod diff;
 mod docs;
 mod doctor;
 pub mod doors;
+mod draft;
 mod exam;
 mod explain;
 mod export;
@@ -62,6 +64,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::ExportCrate(args) => export_crate::run(&args),
         Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args, registry),
         Command::New { what } => new::run(&what, registry),
         Command::Check { configs, json } => check::run(&configs, json, &planning(registry, &consent::none())),
         Command::Graph { config, format, json } => {

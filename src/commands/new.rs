@@ -3,20 +3,16 @@
 use std::path::PathBuf;
 
 use afmid_pipeline::Registry;
-use afmid_pipeline::files::replace_with;
-use afmid_pipeline::recording::is_of_resampling;
 use serde_json::json;
 
-use super::load::plan_text;
+use super::draft::{Draft, is_free};
 use super::target::require_folder;
 use crate::cli::{New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::{print, say};
 use crate::printable::{one_line, shown};
 use crate::relative::folder_of;
-use crate::scaffold::{
-    File, Wanted, choose, joined_files, left_out, look, pipeline, python, python_cause, rust, rust_cause,
-};
+use crate::scaffold::{File, python, python_cause, rust, rust_cause};
 use crate::show::pretty;
 
 /// Writes what was asked for.
@@ -29,52 +25,28 @@ pub fn run(what: &New, registry: &Registry) -> Result<(), Failure> {
 }
 
 fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failure> {
-    let usage = |(problem, help): (String, Option<String>)| Failure::usage(problem, help);
-    let wanted = Wanted {
-        goal: args.goal,
-        channels: &args.channel,
-        inputs: &args.input,
-        records_are: args.records_are,
-        rate_hz: args.rate,
-        unit: args.unit.as_deref(),
-        resample: args.resample,
+    let path = |goal: &str| {
+        let path = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{goal}.toml")));
+        is_free(&path).map(|()| path)
     };
-    let joined = joined_files(&args.recordings, &wanted).map_err(usage)?;
-    let (source, inputs, channels, notes) = match joined {
-        Some(joined) => (joined.source, joined.inputs, joined.outputs, joined.notes),
-        None => (look(&args.recordings, &wanted).map_err(usage)?, args.input.clone(), args.channel.clone(), Vec::new()),
-    };
-    let wanted = Wanted { inputs: &inputs, channels: &channels, ..wanted };
-    let mut choice = choose(&source, &wanted).map_err(usage)?;
-    choice.notes.extend(notes);
-    choice.notes.extend(source.remarks.iter().filter(|remark| is_of_resampling(remark)).cloned());
-    let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", choice.goal.name())));
-    // also a link to nothing
-    if output.symlink_metadata().is_ok() {
-        let help = "choose another file with -o, or remove it".to_owned();
-        return Err(Failure::usage(format!("{} is there already", output.display()), Some(help)));
-    }
-    require_folder(folder_of(&output))?;
-    choice.notes.extend(left_out(&source, args, &output));
-    let text = pipeline(&source, &choice, wanted, folder_of(&output)).map_err(usage)?;
-    let plan = plan_text(&output.display().to_string(), &text, &[], registry)?;
-    replace_with(&output, |file| std::fs::write(file, &text))
-        .map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    choice.notes.iter().for_each(|note| say(&format!("{}\n", one_line(note))));
+    let draft = Draft::new(&args.recordings, args.goal, path, registry)?;
+    draft.write()?;
+    draft.notes.iter().for_each(|note| say(&format!("{}\n", one_line(note))));
+    let output = &draft.path;
     if args.json {
         return print(&pretty(&json!({
             "config": output.display().to_string(),
-            "recordings": source.count(),
-            "goal": choice.goal.name(),
-            "chosen": choice.why,
-            "notes": choice.notes,
+            "recordings": draft.recordings,
+            "goal": draft.goal,
+            "chosen": draft.why,
+            "notes": draft.notes,
         }))?);
     }
-    let files = if source.count() == 1 { "1 file".to_owned() } else { format!("{} files", source.count()) };
+    let files = if draft.recordings == 1 { "1 file".to_owned() } else { format!("{} files", draft.recordings) };
     let name = output.file_stem().unwrap_or_default().to_string_lossy();
-    let why = if choice.why.is_empty() { String::new() } else { format!("; {}", one_line(&choice.why)) };
+    let why = if draft.why.is_empty() { String::new() } else { format!("; {}", one_line(&draft.why)) };
     // the stage that all others lead to
-    let last = plan.nodes.last().map_or("", |node| &node.id);
+    let last = draft.plan.nodes.last().map_or("", |node| &node.id);
     print(&format!(
         "{}: {files}{why}\n  afmid run {0} -o {name}.h5\n  afmid show {name}.h5 {last}\n  afmid report {name}.h5\n",
         output.display()

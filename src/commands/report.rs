@@ -25,9 +25,7 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
     prepare(&output, Target::Page, &[("the result file", args.result.clone())])?;
     args.figures.as_deref().map_or(Ok(()), make_folder)?;
-    let run = read_result(&args.result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
-    let (results, page) = (folder_of(&args.result), folder_of(&output));
-    let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
+    let (run, page) = drawn_page(&args.result, &output)?;
     let drawn = args.figures.as_ref().map(|folder| Figures::new(folder, &run, args.png)).transpose()?;
     replace_with(&output, |temporary| fs::write(temporary, page.as_bytes())).map_err(|error| failed(&error))?;
     let written = drawn.map(|drawn| drawn.write()).transpose()?.unwrap_or_default();
@@ -37,6 +35,21 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
     }
     let all = std::iter::once(output.display().to_string()).chain(figures);
     print(&all.map(|path| one_line(&path) + "\n").collect::<String>())
+}
+
+/// Writes the page of a result, and returns what it is of. Errors: a damaged result; it cannot be written.
+pub fn write_page(result: &Path, output: &Path) -> Result<RunResult, Failure> {
+    let (run, page) = drawn_page(result, output)?;
+    replace_with(output, |temporary| fs::write(temporary, page.as_bytes())).map_err(|error| failed(&error))?;
+    Ok(run)
+}
+
+/// A result and its page. Errors: it is damaged.
+fn drawn_page(result: &Path, output: &Path) -> Result<(RunResult, String), Failure> {
+    let run = read_result(result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let (results, page) = (folder_of(result), folder_of(output));
+    let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
+    Ok((run, page))
 }
 
 /// The address of a data set's page, if it has one, or else of its result.

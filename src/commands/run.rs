@@ -47,18 +47,29 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
         jobs: args.jobs,
         overrides: &plan.config.overrides,
     };
-    written_folders(&plan);
-    let result = computation.run(|options| run_to_file(&plan, options, &output));
-    warn(&cache);
-    interrupt::check()?;
-    let result = result?.map_err(|failed| match failed {
-        Failed::Stages { errors, kept } => stages_failed(&errors, kept),
-        Failed::File(error) => Failure::failed(&error, error.help.clone()),
-    })?;
+    let result = run_and_write(&plan, &output, &computation)?;
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
     print(&format!("{}: {}\n", shown(&output), summary(&result)))
+}
+
+/// Runs a plan and writes its result file, with progress on stderr. Errors: those of its stages, a file that cannot be
+/// written, an interruption.
+pub fn run_and_write(plan: &Plan, output: &Path, how: &Computation<'_>) -> Result<RunResult, Failure> {
+    written_folders(plan);
+    let result = how.run(|options| run_to_file(plan, options, output));
+    warn(how.cache);
+    interrupt::check()?;
+    result?.map_err(not_written)
+}
+
+/// How a run ends that wrote no whole result.
+fn not_written(failed: Failed) -> Failure {
+    match failed {
+        Failed::Stages { errors, kept } => stages_failed(&errors, kept),
+        Failed::File(error) => Failure::failed(&error, error.help.clone()),
+    }
 }
 
 /// Runs a config in this process with these stages and writes its result file; nothing is printed.
@@ -81,10 +92,7 @@ pub fn run_here(
     let computation = Computation { base, cache: &cache, fresh: false, jobs: None, overrides };
     written_folders(&plan);
     let result = computation.watched(observer, |options| run_to_file(&plan, options, output))?;
-    result.map(drop).map_err(|failed| match failed {
-        Failed::Stages { errors, kept } => stages_failed(&errors, kept),
-        Failed::File(error) => Failure::failed(&error, error.help.clone()),
-    })
+    result.map(drop).map_err(not_written)
 }
 
 /// The cache that was asked for, or the user's. What killed processes left in it and in the system's folder for
@@ -230,7 +238,7 @@ pub fn default_output(name: &str) -> PathBuf {
 }
 
 /// What a run reads: its config and the files of its stages.
-fn inputs(plan: &Plan, config: &Path) -> Vec<Input> {
+pub fn inputs(plan: &Plan, config: &Path) -> Vec<Input> {
     let mut inputs = vec![("the config", config.to_owned())];
     for node in &plan.nodes {
         // files that cannot be listed are for the run to complain about

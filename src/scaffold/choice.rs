@@ -8,6 +8,7 @@ use afmid_stages::io::quantity_of_unit;
 
 use super::channels::{driving, inputs, is_named, named, nothing, outputs};
 use super::density::density;
+use super::diagnosis::{Diagnosed, beside, diagnosis};
 use super::first_file::FirstFile;
 use super::hit_names::are_hits;
 use super::lever::{force_curve, is_of_a_lever};
@@ -43,6 +44,8 @@ pub struct Choice<'a> {
     pub segment_samples: Option<usize>,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
+    /// Of a diagnosis of anything but releases, whose goal says it: what it needs beside the channels.
+    pub diagnosis: Option<Diagnosed<'a>>,
     /// Why, for a comment in the config; empty where the user chose.
     pub why: String,
     /// What is left out, for comments and for the user.
@@ -62,14 +65,24 @@ impl<'a> Choice<'a> {
             period_samples: None,
             segment_samples: None,
             records_are: None,
+            diagnosis: None,
             why,
             notes: Vec::new(),
         }
+    }
+
+    /// The goal's name, which is the pipeline's.
+    pub const fn name(&self) -> &'static str {
+        if self.diagnosis.is_some() { Goal::Diagnosis.name() } else { self.goal.name() }
     }
 }
 
 /// Chooses by what the first file holds, as far as the user has not. Errors: what is not known, and how to say it.
 pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+    if let Some(reference) = wanted.reference.filter(|_| wanted.goal != Some(Goal::Diagnosis)) {
+        let help = "wanted --goal diagnosis, or no --reference".to_owned();
+        return Err((format!("--reference {reference}: only a diagnosis is of an axis in its loop"), Some(help)));
+    }
     let file = FirstFile::new(source);
     if let Some(choice) = density(&file, wanted)? {
         return Ok(choice);
@@ -79,13 +92,23 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
         return Err(question);
     }
     let mut choice = by_goal(&file, wanted)?;
-    if choice.channels.first().is_some_and(|channel| does_without_unit(choice.goal, channel, wanted)) {
-        choice.notes.push("no unit is stated: amplitudes are as in the file; --unit UNIT says theirs".to_owned());
-    }
+    choice.notes.extend(choice.channels.first().and_then(|channel| of_unit(&choice, channel, wanted)));
+    choice.notes.extend(beside(source, &choice));
     choice.notes.extend(choice.channels.first().and_then(|channel| of_rate(channel, wanted)));
     let contradicted = choice.channels.first().and_then(|channel| file.contradicted_rate(channel, wanted));
     choice.notes.extend(contradicted.map(|problem| format!("{problem}: is --rate right?")));
     Ok(choice)
+}
+
+/// What is to be said of a unit that nobody states.
+fn of_unit(choice: &Choice<'_>, channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
+    let senses = choice.diagnosis.is_some() && choice.goal != Goal::Steady;
+    if senses && channel.unit.is_empty() && wanted.unit.is_none() {
+        let said = "no unit is stated: a deflection is taken; --unit m/s^2 or g says an acceleration, m/s a rate";
+        return Some(said.to_owned());
+    }
+    let said = "no unit is stated: amplitudes are as in the file; --unit UNIT says theirs";
+    does_without_unit(choice.goal, channel, wanted).then(|| said.to_owned())
 }
 
 fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
@@ -97,6 +120,7 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
             true => one_channel(source, wanted, Goal::SnapOff, String::new()),
             false => Err(question),
         }),
+        Some(Goal::Diagnosis) => diagnosis(file, wanted),
         Some(Goal::Decay) => decay(file, wanted, false),
         Some(goal @ Goal::InputOutput) => input_output(file, wanted, Some(goal)),
         Some(Goal::Frf) if wanted.inputs.is_empty() && file.has_responses(true) => Ok(responses(source)),
@@ -109,7 +133,7 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
 }
 
 /// Without a goal.
-fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
+pub fn by_looks<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, Question> {
     let source = file.source;
     if !wanted.inputs.is_empty() {
         return input_output(file, wanted, None);
@@ -252,7 +276,13 @@ fn decays_instead<'a>(
     Ok(Some(Choice { force: Some(force), ..Choice::of(Goal::Decay, outputs.to_vec(), why) }))
 }
 
-fn one_channel<'a>(source: &'a Source, wanted: &Wanted<'_>, goal: Goal, why: String) -> Result<Choice<'a>, Question> {
+/// One signal. Errors: several were named; none is there.
+pub fn one_channel<'a>(
+    source: &'a Source,
+    wanted: &Wanted<'_>,
+    goal: Goal,
+    why: String,
+) -> Result<Choice<'a>, Question> {
     let channel = match wanted.channels {
         [] => source.best.and_then(|index| source.channels.get(index)).ok_or_else(|| nothing(source))?,
         [one] => named(source, one)?,

@@ -7,8 +7,8 @@ use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, DecayTrigger
 use afmid_kernels::harmonics::find_decays_beside_lines;
 use afmid_kernels::spectra::{half_energy_samples, is_impulsive};
 use afmid_pipeline::recording::{
-    Contents, FoundChannel, FoundResponse, Measurement, Reading, UnpackedContents, contradiction, gains_without_phase,
-    mean_rate, open_unpacked, responses, says_frequencies,
+    Contents, FoundChannel, FoundResponse, Measurement, Reading, UnpackedContents, begun_together, contradiction,
+    gains_without_phase, mean_rate, open_unpacked, put_together, responses, says_frequencies,
 };
 
 use super::channels::{inputs, some_of, usable};
@@ -142,6 +142,22 @@ impl<'a> FirstFile<'a> {
         let found = channels.iter().find(|found| found.location == channel.location);
         let found = found.ok_or_else(|| self.plain(&format!("there is no channel {}", channel.location)))?;
         first_samples(found).map_err(|error| self.plain(&error.to_string()))
+    }
+
+    /// Samples that channels have together, as `io.columns` takes them, and those before which one was interrupted. Errors:
+    /// they cannot be read; clocks that do not agree.
+    pub fn together(&self, channels: &[&Channel], wanted: &Wanted<'_>) -> Result<(usize, Vec<usize>), Question> {
+        let all = &self.contents().map_err(|problem| self.plain(&problem))?.channels;
+        let of = |channel: &&Channel| all.iter().find(|found| found.location == channel.location);
+        let found: Vec<&FoundChannel> = channels.iter().filter_map(of).collect();
+        let moved = match self.source.joined.is_empty() {
+            true => begun_together(&found).map(|moved| moved.map(|(moved, _)| moved)),
+            false => put_together(&found, wanted.rate_hz.is_some()).map(|(moved, _)| Some(moved)),
+        };
+        let moved = moved.map_err(|error| (error.problem, error.help))?;
+        let moved = moved.unwrap_or_else(|| found.into_iter().cloned().collect());
+        let samples = moved.iter().map(|channel| channel.samples).min().unwrap_or(0);
+        Ok((samples, moved.iter().flat_map(|channel| channel.gaps.iter().copied()).collect()))
     }
 
     /// The rate that the file states or the user. Errors: neither.

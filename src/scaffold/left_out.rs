@@ -9,14 +9,14 @@ use super::channels::some_of;
 use super::groups::Group;
 use super::recordings::Source;
 use crate::batch::shell::quoted;
-use crate::cli::NewPipelineArgs;
+use crate::cli::{Goal, RecordingsArgs};
 use crate::show::number as shown;
 
 /// Groups that are named; more are counted.
 const MOST: usize = 8;
 
 /// What of the recordings is not in the config, a line each.
-pub fn left_out(source: &Source, args: &NewPipelineArgs, config: &Path) -> Vec<String> {
+pub fn left_out(source: &Source, args: &RecordingsArgs, goal: Option<Goal>, config: &Path) -> Vec<String> {
     let others = &source.others;
     let mut lines: Vec<String> = others
         .iter()
@@ -24,7 +24,8 @@ pub fn left_out(source: &Source, args: &NewPipelineArgs, config: &Path) -> Vec<S
         .enumerate()
         .map(|(number, group)| match group.lacks.is_empty() {
             true => {
-                format!("left out: {}; for a config of them: {}", group.said(), command(source, number, args, config))
+                let command = command(source, number, args, goal, config);
+                format!("left out: {}; for a config of them: {command}", group.said())
             }
             false => format!("left out: {}, without {}", group.said(), group.lacks.join(", ")),
         })
@@ -52,11 +53,11 @@ fn skipped(files: &[(PathBuf, String)]) -> Vec<String> {
 }
 
 /// The command that makes a config of one of the other groups.
-fn command(source: &Source, number: usize, args: &NewPipelineArgs, config: &Path) -> String {
+fn command(source: &Source, number: usize, args: &RecordingsArgs, goal: Option<Goal>, config: &Path) -> String {
     let Some(group) = source.others.get(number) else { return String::new() };
     let mut words = vec!["afmid new pipeline".to_owned()];
-    let rate = rate_that_chooses(source, number).filter(|_| args.recordings.iter().all(|path| path.is_dir()));
-    let files = if rate.is_some() { &args.recordings } else { &group.files };
+    let rate = rate_that_chooses(source, number).filter(|_| args.paths.iter().all(|path| path.is_dir()));
+    let files = if rate.is_some() { &args.paths } else { &group.files };
     words.extend(files.iter().map(quoted));
     let name = |value: Option<clap::builder::PossibleValue>| value.map(|value| value.get_name().to_owned());
     if args.resample {
@@ -69,10 +70,11 @@ fn command(source: &Source, number: usize, args: &NewPipelineArgs, config: &Path
     if let Some(rate) = rate.or(carried).map(|rate| rate.to_string()).or(own) {
         say("--rate", rate);
     }
-    name(args.goal.and_then(|goal| goal.to_possible_value())).into_iter().for_each(|goal| say("--goal", goal));
+    name(goal.and_then(|goal| goal.to_possible_value())).into_iter().for_each(|goal| say("--goal", goal));
     name(args.records_are.and_then(|what| what.to_possible_value())).into_iter().for_each(|what| say("--as", what));
     args.channel.iter().for_each(|channel| say("--channel", channel.clone()));
     args.input.iter().for_each(|input| say("--input", input.clone()));
+    args.reference.iter().for_each(|reference| say("--reference", reference.clone()));
     args.unit.iter().for_each(|unit| say("--unit", unit.clone()));
     let stem = config.file_stem().unwrap_or_default().to_string_lossy();
     let file = config.with_file_name(format!("{stem}-{}.toml", number + 2));

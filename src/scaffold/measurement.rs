@@ -18,6 +18,8 @@ pub struct JoinedFiles {
     /// As `FILE:CHANNEL`.
     pub inputs: Vec<String>,
     pub outputs: Vec<String>,
+    /// Of an axis in its loop, what the output is to follow.
+    pub reference: Option<String>,
     /// What was done to put them together.
     pub notes: Vec<String>,
 }
@@ -38,22 +40,25 @@ pub fn joined_files(paths: &[PathBuf], wanted: &Wanted<'_>) -> Result<Option<Joi
         let help = "leave --as out, or --input with a file's name".to_owned();
         return Err(("--as is for several measurements, these files are one".to_owned(), Some(help)));
     }
-    if !matches!(wanted.goal, None | Some(Goal::InputOutput | Goal::Frf | Goal::Modes)) {
-        let help = "wanted --goal input-output or frf, or none".to_owned();
+    if !matches!(wanted.goal, None | Some(Goal::InputOutput | Goal::Frf | Goal::Modes | Goal::Diagnosis)) {
+        let help = "wanted --goal input-output, frf or diagnosis, or none".to_owned();
         return Err(("that goal takes no measured input in a file of its own".to_owned(), Some(help)));
     }
     let files = Files::open(paths, wanted.resample)?;
     let inputs = files.inputs(wanted)?;
-    let outputs = files.outputs(wanted, &inputs)?;
+    let reference = wanted.reference.map(|name| files.named("--reference", name)).transpose()?;
+    let driving: Vec<&Channel> = inputs.iter().copied().chain(reference).collect();
+    let outputs = files.outputs(wanted, &driving)?;
     let of = |channel: &&Channel| {
         let mut all = files.opened.contents().channels.iter();
         all.find(|found| found.location == channel.location)
     };
-    let chosen: Vec<&FoundChannel> = inputs.iter().chain(&outputs).filter_map(of).collect();
+    let chosen: Vec<&FoundChannel> = driving.iter().chain(&outputs).filter_map(of).collect();
     let (_, notes) = put_together(&chosen, wanted.rate_hz.is_some()).map_err(|error| (error.problem, error.help))?;
     let locations = |all: &[&Channel]| all.iter().map(|channel| channel.location.clone()).collect();
     let (inputs, outputs) = (locations(&inputs), locations(&outputs));
-    Ok(Some(JoinedFiles { source: files.source(), inputs, outputs, notes }))
+    let reference = reference.map(|channel| channel.location.clone());
+    Ok(Some(JoinedFiles { source: files.source(), inputs, outputs, reference, notes }))
 }
 
 /// What is behind a file's path or name in what the user names: nothing, or a channel; none if it is not that file.

@@ -4,6 +4,8 @@ mod cause;
 mod channels;
 mod choice;
 mod density;
+mod diagnosis;
+mod diagnosis_config;
 mod first_file;
 mod groups;
 mod hit_names;

@@ -8,6 +8,7 @@ use afmid_stages::io::quantity_of_unit;
 
 use super::choice::{Choice, Question};
 use super::density;
+use super::diagnosis_config;
 use super::points;
 use super::recordings::Source;
 use super::stated;
@@ -23,6 +24,8 @@ pub struct Wanted<'a> {
     pub goal: Option<Goal>,
     pub channels: &'a [String],
     pub inputs: &'a [String],
+    /// Of a diagnosis: what the output is to follow.
+    pub reference: Option<&'a str>,
     pub records_are: Option<RecordsAre>,
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
@@ -66,6 +69,10 @@ impl Choice<'_> {
     const fn template(&self) -> (&'static str, &'static str) {
         if self.frequencies.is_some() {
             return (include_str!("../../configs/thermal-spectrum.toml"), "io.spectrum");
+        }
+        if let Some(diagnosed) = &self.diagnosis {
+            let reader = if self.inputs.is_empty() { "io.records" } else { "io.columns" };
+            return (diagnosis_config::template(self.goal, diagnosed), reader);
         }
         match (self.goal, self.inputs.is_empty()) {
             (Goal::Frf, false) => (include_str!("../../configs/hammer.toml"), "io.columns"),
@@ -118,8 +125,11 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             continue;
         }
         match line.split_once(" = ") {
-            Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.goal.name())),
+            Some(("name", _)) => text.push_str(&format!("name = \"{}\"\n", choice.name())),
             Some(("params", _)) if stage == reader => text.push_str(&params),
+            Some(("params", old)) if stage == "\"diagnosis.causes\"" => {
+                text.push_str(&diagnosis_config::axis_params(choice).unwrap_or_else(|| format!("params = {old}\n")));
+            }
             // the band is one of its data
             Some(("params", _)) if stage == "\"spectrum.thermal\"" => {}
             Some(("params", _)) if stage == "\"events.decay\"" => {
@@ -247,6 +257,7 @@ pub fn columns(
     if let Some(unit) = wanted.unit {
         params.insert("output_unit".to_owned(), text(unit));
     }
+    choice.diagnosis.iter().for_each(|diagnosed| diagnosis_config::stretches(choice, diagnosed, &mut params));
     Ok(format!("params = {}\n", Value::Table(params)))
 }
 
@@ -299,6 +310,7 @@ mod tests {
             goal: Some(goal),
             channels: &[],
             inputs: &[],
+            reference: None,
             records_are: None,
             rate_hz: None,
             unit: None,

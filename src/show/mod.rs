@@ -12,6 +12,7 @@ mod partners;
 mod pretty;
 mod size;
 mod stage;
+mod verdict;
 
 pub use artifact::artifact_text;
 pub use change::{change_json, change_text};
@@ -23,3 +24,4 @@ pub use overview::{overview_json, overview_text, stage_head};
 pub use pretty::pretty;
 pub use size::size;
 pub use stage::{SUMMARY, stage_json};
+pub use verdict::verdict_lines;

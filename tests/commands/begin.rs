@@ -131,7 +131,7 @@ fn one_decay_gives_the_same_modes_from_any_file_by_three_commands() {
 }
 
 /// White noise: sums of twelve uniform numbers.
-fn white(seed: u64, samples: usize) -> Vec<f64> {
+pub(super) fn white(seed: u64, samples: usize) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut uniform = || {
         state ^= state << 13;

@@ -10,6 +10,7 @@ mod begin_advice;
 mod begin_files;
 mod clocks;
 mod command_line;
+mod diagnose;
 mod errors;
 mod example;
 mod measurement;

@@ -235,6 +235,10 @@ fn unit(channels: &[FoundChannel], given: Option<&str>, scale: f64, what: &str) 
     let scaled = scale != 1.0;
     match (given, channels.first().map_or("", |channel| &channel.unit)) {
         (Some(given), _) if scaled => Ok(given.to_owned()),
+        // a set point and a drive
+        (Some(given), _) if are_several(channels) && channels.iter().any(|channel| stated(channel) == given) => {
+            Ok(given.to_owned())
+        }
         (None, _) if scaled => Err(StageError::new(format!("`{what}_scale` is {scale} and `{what}_unit` is missing"))
             .help(format!("say what the scaled values are in: {what}_unit = \"N\""))),
         (given, stated) => match channels.iter().find(|channel| given.unwrap_or(stated) != channel.unit) {
@@ -246,6 +250,16 @@ fn unit(channels: &[FoundChannel], given: Option<&str>, scale: f64, what: &str) 
             _ => Ok(Some(given.unwrap_or(stated)).filter(|unit| !unit.is_empty()).unwrap_or("1").to_owned()),
         },
     }
+}
+
+/// The unit that a channel states, 1 if it states none.
+fn stated(channel: &FoundChannel) -> &str {
+    if channel.unit.is_empty() { "1" } else { &channel.unit }
+}
+
+/// Whether channels are in several units.
+fn are_several(channels: &[FoundChannel]) -> bool {
+    channels.iter().any(|channel| channels.first().is_some_and(|first| stated(first) != stated(channel)))
 }
 
 /// As the file names channels.

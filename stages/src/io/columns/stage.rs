@@ -100,7 +100,8 @@ pub struct Columns {
     /// Factor of the output. The unit is then `output_unit`.
     #[schemars(extend("not" = { "const": 0.0 }))]
     pub output_scale: f64,
-    /// Unit of the inputs, where the file states none or they are scaled. Absent: 1.
+    /// Unit of the inputs, where the file states none or they are scaled; of inputs in several units, such as a set point
+    /// and a drive, the one that counts. Absent: the file's, or 1.
     pub input_unit: Option<String>,
     /// Unit of the output, likewise.
     pub output_unit: Option<String>,
