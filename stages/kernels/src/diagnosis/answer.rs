@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::data::{Bench, Part, PartStart, Record};
 use super::dynamics::Kind;
-use super::fit::{Blocks, FOLDS, Fit};
+use super::fit::{Blocks, FOLDS, Fit, Until};
 use super::instants::instant_std;
 use super::lack_of_fit::Misfit;
 use super::options::DiagnosisOptions;
@@ -37,7 +37,7 @@ impl Findings<'_> {
         let validation = self.validation();
         let errors = self.held_out();
         let all = self.named(&errors);
-        let Ruling { verdict, stand, because } = self.grounds(&all, &errors).ruling();
+        let Ruling { verdict, stand, because } = self.grounds(&all, &errors).ruling(&|stand| self.alone(stand));
         let causes = stand.into_iter().filter_map(|number| all.get(number).cloned()).collect();
         Diagnosis {
             p_value: None,
@@ -94,19 +94,15 @@ impl Findings<'_> {
     /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
     fn grounds(&self, named: &[NamedCause], errors: &[Option<f64>]) -> Grounds {
         let square = |rms: Option<f64>| rms.map(|rms| rms * rms);
-        let places: Vec<usize> =
-            self.choice.chosen.iter().filter(|own| own.has_a_name()).map(|own| own.place).collect();
-        let at = |rung: usize| square(errors.get(rung).copied().flatten());
-        let of = |(cause, place): (&NamedCause, &usize)| Claim {
+        let of = |cause: &NamedCause| Claim {
             id: cause.id.clone(),
             held_out: square(cause.gain.rms_before).zip(square(cause.gain.rms_after)).map(|(a, b)| [a, b]),
-            step: at(*place).zip(at(place + 1)).map_or(0.0, |(before, after)| before - after),
         };
         let ends = errors.first().copied().flatten().zip(errors.last().copied().flatten());
         Grounds {
             adequate: self.adequate,
             systematic: self.systematic(),
-            claims: named.iter().zip(&places).map(of).collect(),
+            claims: named.iter().map(of).collect(),
             unnamed: !self.choice.chosen.is_empty(),
             training: square(self.choice.ladder.last().and_then(|last| self.rms(last.fit.loss))),
             held_out: ends.map(|(before, after)| [before * before, after * after]),
@@ -114,6 +110,22 @@ impl Findings<'_> {
             against_clean: self.repeated().into_iter().collect(),
             against_all: self.endless().into_iter().collect(),
         }
+    }
+
+    /// Mean square on what names have to gain on of the last model without the named causes that do not stand, refitted.
+    fn alone(&self, stand: &[usize]) -> Option<f64> {
+        let named: Vec<usize> = self.choice.chosen.iter().filter(|own| own.has_a_name()).map(|own| own.place).collect();
+        let mut gone: Vec<usize> =
+            named.iter().enumerate().filter(|(number, _)| !stand.contains(number)).map(|(_, place)| *place).collect();
+        gone.sort_unstable();
+        let last = &self.choice.ladder.last()?.fit.model;
+        let model = gone.into_iter().rev().fold(last.clone(), |model, which| model.without(which));
+        let judged = Judged::new(Fit::new(self.bench, &model, Until::JUDGED)?, self.bench, &self.blocks);
+        let rms = match held_out(&self.options.parts) {
+            [] => self.rms(judged.unseen()),
+            parts => pooled_rms(self.bench, self.records, &judged.fit.model, parts),
+        };
+        rms.map(|rms| rms * rms)
     }
 
     /// Variance of the noise in the output's unit, from where the system does not respond.

@@ -80,7 +80,7 @@ impl LinearOnly {
             against_clean: against,
             ..Grounds::default()
         };
-        grounds.ruling()
+        grounds.ruling(&|_| None)
     }
 
     /// The verdict on it alone: no cause, whatever it says.

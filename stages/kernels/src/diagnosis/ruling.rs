@@ -6,8 +6,8 @@ use super::verdict::Verdict;
 /// may stand for a part of what is left, whatever that is; half, since names beside one another do some of each other's
 /// work when one is left out.
 const OF_EXCESS: f64 = 0.5;
-/// Share of what all causes take together, of the squared error of what was held out, that those without a name may take.
-/// Why: names beside as much else may stand for what that is part of.
+/// Share of what all causes take together, of the squared error of what was held out, that names alone may miss. Why: names
+/// beside as much else may stand for what that is part of.
 const BESIDE: f64 = 0.05;
 /// Mean square on held-out data over that of training from which on they do not agree: an error twice as large. Why not
 /// less: a part to judge on begins in a state that few samples tell.
@@ -20,8 +20,6 @@ pub struct Claim {
     pub id: String,
     /// Mean squared errors on what did not choose it, without it and with it.
     pub held_out: Option<[f64; 2]>,
-    /// By how much it lowered the mean square of what was held out when it was added.
-    pub step: f64,
 }
 
 /// What a verdict is made from; mean squares are of the output, in one unit.
@@ -61,10 +59,12 @@ pub struct Ruling {
 impl Grounds {
     /// # Method
     /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves there
-    /// beyond noise. `named` if a name stands, those that fall took a twentieth of what all take at most, the model is adequate, nothing systematic is left, and the answer's error
+    /// beyond noise. `named` if a name stands, names alone miss a twentieth of what all causes take at most, the model is adequate, nothing systematic is left, and the answer's error
     /// on what was held out is below the linear model's. `clean` if there is no cause, and neither a test nor the held-out
     /// error contradict. Else `unexplained`.
-    pub fn ruling(&self) -> Ruling {
+    ///
+    /// `alone`: mean square on what was held out of a model with these claims alone, refitted; none where it is not known.
+    pub fn ruling(&self, alone: &dyn Fn(&[usize]) -> Option<f64>) -> Ruling {
         let mut because = self.against_all.clone();
         let mut verdict = |verdict: Verdict, stand: Vec<usize>, more: Vec<String>| {
             because.extend(more);
@@ -87,22 +87,25 @@ impl Grounds {
             let found = if against.is_empty() { Verdict::Clean } else { Verdict::Unexplained };
             return verdict(found, Vec::new(), against);
         }
-        let (mut stand, mut fallen, mut beside) = (Vec::new(), Vec::new(), 0.0);
+        let (mut stand, mut fallen) = (Vec::new(), Vec::new());
         for (number, claim) in self.claims.iter().enumerate() {
             match self.too_little(claim) {
                 None => stand.push(number),
-                Some(said) => {
-                    fallen.push(said);
-                    beside += claim.step.max(0.0);
-                }
+                Some(said) => fallen.push(said),
             }
         }
-        let taken = self.held_out.map_or(0.0, |[before, after]| before - after);
-        if !stand.is_empty() && beside > BESIDE * taken {
+        let beside = || {
+            let ([before, after], alone) = (self.held_out?, alone(&stand)?);
+            Some((alone - after) / (before - after))
+        };
+        if !stand.is_empty()
+            && !fallen.is_empty()
+            && let Some(share) = beside().filter(|share| share.is_nan() || *share > BESIDE)
+        {
             fallen.push(format!(
-                "those without a name take {:.1} % of what all causes take together: the others may stand for what those are \
-                 part of",
-                100.0 * beside / taken
+                "without those that have no name the others miss {:.1} % of what all causes take together: they may stand \
+                 for what those are part of",
+                100.0 * share
             ));
             stand.clear();
         }
@@ -195,7 +198,7 @@ mod tests {
     use crate::fixture::white_noise;
 
     fn claim(id: &str, held_out: [f64; 2]) -> Claim {
-        Claim { id: id.to_owned(), held_out: Some(held_out), step: held_out[0] - held_out[1] }
+        Claim { id: id.to_owned(), held_out: Some(held_out) }
     }
 
     fn fine() -> Grounds {
@@ -210,7 +213,7 @@ mod tests {
 
     #[test]
     fn clean_is_what_nothing_contradicts() {
-        assert_eq!(fine().ruling().verdict, Verdict::Clean);
+        assert_eq!(fine().ruling(&|_| None).verdict, Verdict::Clean);
         let wrong = [
             Grounds { adequate: false, ..fine() },
             Grounds { systematic: true, ..fine() },
@@ -221,14 +224,14 @@ mod tests {
             Grounds { unnamed: true, ..fine() },
         ];
         for grounds in wrong {
-            assert_eq!(grounds.ruling().verdict, Verdict::Unexplained, "{grounds:?}");
+            assert_eq!(grounds.ruling(&|_| None).verdict, Verdict::Unexplained, "{grounds:?}");
         }
     }
 
     #[test]
     fn a_name_takes_more_than_what_is_left_beyond_noise() {
         let of = |claims: Vec<Claim>, held_out: [f64; 2], noise: f64| {
-            Grounds { claims, held_out: Some(held_out), noise: Some(noise), ..fine() }.ruling()
+            Grounds { claims, held_out: Some(held_out), noise: Some(noise), ..fine() }.ruling(&|_| None)
         };
         // beside noise alone a hundredth is enough
         let found = of(vec![claim("a", [9.0, 1.0]), claim("b", [1.01, 1.0])], [9.0, 1.0], 1.0);
@@ -237,9 +240,17 @@ mod tests {
         let found = of(vec![claim("a", [9.0, 1.0]), claim("b", [1.01, 1.0])], [9.0, 1.0], 0.1);
         assert_eq!((found.verdict, found.stand), (Verdict::Named, vec![0]));
         assert!(found.because.len() == 1 && found.because[0].starts_with("b takes 1.1 %"), "{:?}", found.because);
-        // and none stands beside others that took a tenth
-        let found = of(vec![claim("a", [9.0, 1.0]), Claim { step: 0.9, ..claim("b", [1.01, 1.0]) }], [9.0, 1.0], 0.1);
+        // and none stands that alone misses a tenth of what both take
+        let grounds = Grounds {
+            claims: vec![claim("a", [9.0, 1.0]), claim("b", [1.01, 1.0])],
+            held_out: Some([9.0, 1.0]),
+            noise: Some(0.1),
+            ..fine()
+        };
+        let found = grounds.ruling(&|stand| (stand == [0]).then_some(1.9));
         assert_eq!((found.verdict, found.stand.len(), found.because.len()), (Verdict::Unexplained, 0, 2));
+        let found = grounds.ruling(&|_| Some(1.1));
+        assert_eq!((found.verdict, found.stand), (Verdict::Named, vec![0]));
         let found = of(vec![claim("b", [1.01, 1.0])], [9.0, 1.0], 0.1);
         assert_eq!(found.verdict, Verdict::Unexplained);
         let found = of(vec![claim("c", [0.9, 1.0])], [9.0, 1.0], 1.0);
@@ -249,9 +260,9 @@ mod tests {
     #[test]
     fn causes_that_raise_the_error_of_what_was_held_out_are_no_answer() {
         let grounds = Grounds { claims: vec![claim("a", [40.0, 30.0])], held_out: Some([4.0, 25.0]), ..fine() };
-        let found = grounds.ruling();
+        let found = grounds.ruling(&|_| None);
         assert_eq!((found.verdict, found.stand.len()), (Verdict::Unexplained, 0));
-        assert!(found.because[0].contains("2.5 times"), "{:?}", found.because);
+        assert!(found.because[0].contains("2.500 times"), "{:?}", found.because);
     }
 
     #[test]

@@ -44,10 +44,10 @@ impl Findings<'_> {
     fn diagnosis(&self, adequacy: &Adequacy, before: &[f64], after: &[f64]) -> Diagnosis {
         let left = self.choice.left.iter().any(|(_, share)| *share > TOLERATED);
         let all = self.named();
-        let claim = |cause: &NamedCause| Claim { id: cause.id.clone(), held_out: None, step: 0.0 };
+        let claim = |cause: &NamedCause| Claim { id: cause.id.clone(), held_out: None };
         let claims = all.iter().map(claim).collect();
         let grounds = Grounds { adequate: adequacy.adequate, systematic: left, claims, ..Grounds::default() };
-        let Ruling { verdict, stand, .. } = grounds.ruling();
+        let Ruling { verdict, stand, .. } = grounds.ruling(&|_| None);
         let named = stand.into_iter().filter_map(|number| all.get(number).cloned()).collect();
         let p_values = self.choice.steps.iter().map(|step| step.trial.p_value);
         let training = self.rms(before, &self.bench.training);
