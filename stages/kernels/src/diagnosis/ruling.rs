@@ -145,7 +145,7 @@ impl Grounds {
     }
 }
 
-/// Order of the differences that noise is told by.
+/// Order of the differences that show noise.
 const ORDER: usize = 6;
 /// Sum of the squares of their weights, `binomial(12, 6)`.
 const WEIGHT: f64 = 924.0;
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_told_from_what_is_slow() {
+    fn noise_is_seen_beside_what_is_slow() {
         let noise = white_noise(4000, 0.1, 3);
         let slow = |size: f64| -> Vec<f64> {
             noise.iter().enumerate().map(|(k, n)| n + size * (std::f64::consts::TAU * 0.05 * k as f64).sin()).collect()
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn what_repeats_is_told_from_noise() {
+    fn what_repeats_is_seen_beside_noise() {
         let noise = white_noise(1000, 0.1, 5);
         let with = |size: f64| -> Vec<f64> {
             noise.iter().enumerate().map(|(k, n)| n + size * (0.37 * (k % 250) as f64).sin()).collect()
