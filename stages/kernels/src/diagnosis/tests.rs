@@ -323,33 +323,3 @@ fn a_law_without_a_name_is_said() {
     // all twelve are reached; one of each may miss
     assert!(unexplained + 1 >= jobs.len() && said + 1 >= jobs.len());
 }
-
-/// A ball in a tube: what is put in sums up twice, with a loss, between two stops.
-#[test]
-fn an_integrator_between_stops_has_no_names() {
-    for seed in 0..3 {
-        let mut rng = ChaCha8Rng::seed_from_u64(700 + seed);
-        let (mut x, mut v, mut target) = (0.5, 0.0, 0.5);
-        let (mut input, mut output) = (Vec::new(), Vec::new());
-        for k in 0..SAMPLES {
-            if k % 200 == 0 {
-                target = rng.random_range(-0.4..1.4);
-            }
-            let white: f64 = StandardNormal.sample(&mut rng);
-            output.push(x + 0.01 * white);
-            // the operator watches it, late and roughly
-            let u: f64 = 0.3 * (target - x) - 0.2 * v;
-            input.push((20.0 * u).round() / 20.0);
-            v += 0.02 * (input[k] - 0.3 * v);
-            x += 0.05 * v;
-            if !(0.0..=1.0).contains(&x) {
-                (x, v) = (x.clamp(0.0, 1.0), 0.0);
-            }
-        }
-        let training = vec![Stretch { record: 0, first: 0, end: SAMPLES }];
-        let options = DiagnosisOptions { training, ..DiagnosisOptions::default() };
-        let record = Record { input: &input, outputs: vec![&output] };
-        let found = diagnose(&[record], 1.0 / RATE_HZ, &options).expect("a diagnosis").diagnosis;
-        assert!(found.verdict == Verdict::Unexplained && found.causes.is_empty(), "{seed}: {found:?}");
-    }
-}
