@@ -125,7 +125,7 @@ fn forced<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, looks: Choice<'a>) -> R
     one_file(source, "input and output")?;
     let (longest, note) = longest(file, &looks.inputs, output, wanted)?;
     let middle = longest.start.midpoint(longest.end);
-    let stretches = note.is_some().then(|| [longest.start..middle, middle..longest.end]);
+    let stretches = note.is_some().then_some([longest.start..middle, middle..longest.end]);
     let measured = if looks.inputs.len() > 1 { "inputs" } else { "input" };
     let (names, record) = (listed(&looks.inputs), source.name());
     let why = format!("measured {measured} {names} and output {} in {record}", output.location);
