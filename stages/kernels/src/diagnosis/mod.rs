@@ -4,9 +4,10 @@
 //! simulated), fit (least squares of the free-run error, blocks, folds), baseline (the linear model, found by itself),
 //! score_test (which causes could make what is left), selection (forward steps, backward elimination, exchange),
 //! library (general terms, whatever the cause), lack_of_fit (whether they predict what remains), unnamed_law (whether one
-//! of them does more than the names miss), ruling (what follows from all that: the verdict), chain (linear parts around a static curve, where no causes
-//! account for the data), linear_only (how far a linear model goes, where none can be extended), validation (parts that
-//! chose nothing), simulation (of other inputs, with the model that it ends with), story (what a person looks at), answer.
+//! of them does more than the names miss), ruling (what follows from all that: the verdict), chain (linear parts around
+//! a static curve, where no causes account for the data), linear_only (how far a linear model goes, where none can be
+//! extended), validation (parts that chose nothing), simulation (of other inputs, with the model that it ends with), story
+//! (what a person looks at), answer.
 //!
 //! Three kinds of measurement have equations of their own: an axis under a feedback controller ([`closed_loop`]), whose
 //! drive depends on its output; a steady oscillation ([`steady`]), which says nothing of a decay but everything of the

@@ -58,10 +58,11 @@ pub struct Ruling {
 
 impl Grounds {
     /// # Method
-    /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves there
-    /// beyond noise. `named` if a name stands, names alone miss a twentieth of what all causes take at most, the model is adequate, nothing systematic is left, and the answer's error
+    /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves
+    /// beyond noise, where it was fitted or held out, whichever is less. `named` if a name stands, the names alone miss at
+    /// most a twentieth of what all causes take, the model is adequate, nothing systematic is left, and the answer's error
     /// on what was held out is below the linear model's. `clean` if there is no cause, and neither a test nor the held-out
-    /// error contradict. Else `unexplained`.
+    /// error contradicts. Else `unexplained`.
     ///
     /// `alone`: mean square on what was held out of a model with these claims alone, refitted; none where it is not known.
     pub fn ruling(&self, alone: &dyn Fn(&[usize]) -> Option<f64>) -> Ruling {

@@ -51,10 +51,10 @@ struct Alone {
 /// # Model
 /// As [`fit_channels`](super::fit_channels), for the hits of each system; a system has modes of its own.
 /// # Method
-/// All hits are fitted together, then each by itself from those modes, what it lacks left out. Where two of those lie
-/// near each other, or hits do not share a mode, each is fitted from nothing, as is a hit that more than noise is left
-/// of, six modes at most. From the one with the most energy on, each joins the first system
-/// with whose first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
+/// All hits are fitted together, then each by itself from those modes, without those that the others make up for. Where
+/// two of them lie near each other, or hits do not share a mode, each is fitted from nothing, six modes at most, as is a
+/// hit of which more than noise is left. From the one with the most energy on, each joins the first system with whose
+/// first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
 /// mode unless their difference has a probability below 0.001 over the number of hits, and exceeds what one linear mode
 /// can stand for (a tenth of the half width to either side, of damped modes two thousandths of the frequency at most), or
 /// what the mode's motion with its amplitude explains.
