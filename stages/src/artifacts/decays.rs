@@ -5,7 +5,7 @@ use std::ops::Range;
 use afmid_pipeline::{Array, Attribute, Axis, StageError, Values};
 use serde::{Deserialize, Serialize};
 
-use super::{SAMPLE_RATE_HZ, rate_std_of, sample_rate_of};
+use super::{RateError, SAMPLE_RATE_HZ, sample_rate_of};
 
 const SIGNAL: &str = "signal";
 const SAMPLE: &str = "sample";
@@ -32,8 +32,7 @@ pub struct Sensor {
 #[derive(Debug, Clone)]
 pub(crate) struct Decays<'a> {
     pub sample_rate_hz: f64,
-    /// Its standard error, relative.
-    pub rate_relative_std: f64,
+    pub rate_error: RateError,
     pub sensors: Vec<Sensor>,
     /// Per hit a stretch of each sensor, of one length.
     pub hits: Vec<Vec<&'a [f64]>>,
@@ -62,8 +61,8 @@ impl<'a> Decays<'a> {
             Err(_) => Vec::new(),
         };
         let numbers = (0..hits.len()).collect();
-        let rate_relative_std = rate_std_of(array);
-        Ok(Self { sample_rate_hz: sample_rate_of(array)?, rate_relative_std, sensors, hits, numbers, quiet })
+        let (sample_rate_hz, rate_error) = (sample_rate_of(array)?, RateError::of(array));
+        Ok(Self { sample_rate_hz, rate_error, sensors, hits, numbers, quiet })
     }
 
     /// Leaves out hits with fewer than `least` samples that are there in any channel; their numbers.

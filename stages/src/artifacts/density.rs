@@ -2,6 +2,8 @@
 
 use afmid_pipeline::{Array, Attribute, Axis, StageError};
 
+use super::RateError;
+
 const FREQUENCY_HZ: &str = "frequency_hz";
 const DENSITY: &str = "density";
 const AVERAGES: &str = "averages";
@@ -34,6 +36,11 @@ impl<'a> Density<'a> {
     /// Unit of the signal.
     pub fn signal_unit(&self) -> &'a str {
         self.array.attributes.get(SIGNAL_UNIT).and_then(Attribute::as_str).unwrap_or("V")
+    }
+
+    /// How well the sample rate of the signal is known, and with it the frequencies.
+    pub fn rate_error(&self) -> RateError {
+        RateError::of(self.array)
     }
 
     /// The window that the spectra were taken through, where it is stated.

@@ -4,7 +4,7 @@ use afmid_kernels::events::EventKind;
 use afmid_pipeline::rows::RowView;
 use afmid_pipeline::{Array, Axis, StageError, Values};
 
-use super::{KIND, SAMPLE_RATE_HZ, copy_attributes, event_kind, sample_rate_of};
+use super::{KIND, RateError, SAMPLE_RATE_HZ, copy_attributes, event_kind, sample_rate_of};
 
 const SIGNAL: &str = "signal";
 const RECORD: &str = "record";
@@ -26,6 +26,11 @@ impl<'a> Ensemble<'a> {
     /// Samples per second. Errors: not stated, or what is no rate.
     pub fn sample_rate_hz(&self) -> Result<f64, StageError> {
         sample_rate_of(self.array)
+    }
+
+    /// How well that is known.
+    pub fn rate_error(&self) -> RateError {
+        RateError::of(self.array)
     }
 
     /// Time after the onset.
@@ -82,9 +87,10 @@ impl<'a> Ensemble<'a> {
         Ok(records.iter().zip(onsets).map(|(r, t)| (usize::try_from(*r).unwrap_or(usize::MAX), t * rate)).collect())
     }
 
-    /// States of `array` what the ensemble states: rate, onset and kind.
-    pub fn describe(&self, array: &mut Array) {
-        copy_attributes(self.array, array, &[SAMPLE_RATE_HZ, ONSET_SAMPLE, KIND]);
+    /// An array that states what the ensemble states: rate and its error, onset and kind.
+    pub fn described(&self, mut array: Array) -> Array {
+        copy_attributes(self.array, &mut array, &[SAMPLE_RATE_HZ, ONSET_SAMPLE, KIND]);
+        self.rate_error().stated_by(array)
     }
 
     /// States of `array` the kind of its events.
@@ -101,6 +107,7 @@ pub(crate) struct NewEnsemble<'a> {
     /// Of each event.
     pub samples: usize,
     pub sample_rate_hz: f64,
+    pub rate_error: RateError,
     pub onset_sample: usize,
     pub kind: Option<EventKind>,
     pub unit: &'a str,
@@ -117,6 +124,7 @@ impl NewEnsemble<'_> {
         .with(SIGNAL, self.unit, "deflection signal", &["event", "time"], self.signal)
         .attribute(SAMPLE_RATE_HZ, self.sample_rate_hz)
         .attribute(ONSET_SAMPLE, self.onset_sample);
+        let array = self.rate_error.stated_by(array);
         match self.kind {
             Some(kind) => array.attribute(KIND, kind.name()),
             None => array,

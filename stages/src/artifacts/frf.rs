@@ -4,7 +4,7 @@ use afmid_pipeline::{Array, Attribute, Axis, StageError};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use super::SAMPLE_RATE_HZ;
+use super::{RateError, SAMPLE_RATE_HZ};
 
 const FREQUENCY_HZ: &str = "frequency_hz";
 const RESPONSE: &str = "response";
@@ -89,6 +89,8 @@ pub(crate) struct Frf<'a> {
     pub driving_point: Option<usize>,
     /// Samples per second of what it was measured from.
     pub sample_rate_hz: Option<f64>,
+    /// How well that is known, and with it the frequencies.
+    pub rate_error: RateError,
     /// Records, hits or segments that were averaged.
     pub averages: Option<f64>,
     /// What an exponential window added to the decay rate of every mode, 1/s; to be subtracted from `-Re(s)`.
@@ -134,6 +136,7 @@ impl<'a> Frf<'a> {
             unit: &array.variable(FRF)?.unit,
             driving_point,
             sample_rate_hz: number(SAMPLE_RATE_HZ),
+            rate_error: RateError::of(array),
             averages: number(AVERAGES),
             added_decay_per_s: number(ADDED_DECAY_PER_S).unwrap_or(0.0),
             responses,
@@ -174,6 +177,8 @@ pub(crate) struct NewFrf {
     pub unit: String,
     pub driving_point: Option<usize>,
     pub sample_rate_hz: Option<f64>,
+    /// How well that is known, and with it the frequencies.
+    pub rate_error: RateError,
     pub averages: Option<f64>,
     pub added_decay_per_s: f64,
 }
@@ -230,7 +235,7 @@ impl NewFrf {
         for (name, value) in [(SAMPLE_RATE_HZ, self.sample_rate_hz), (AVERAGES, self.averages)] {
             array = value.into_iter().fold(array, |array, value| array.attribute(name, value));
         }
-        Ok(array)
+        Ok(self.rate_error.stated_by(array))
     }
 }
 

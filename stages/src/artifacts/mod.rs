@@ -27,6 +27,7 @@ mod model;
 mod modes;
 mod pair;
 mod quantity;
+mod rate_error;
 mod ringing;
 mod roots;
 mod shapes;
@@ -51,6 +52,7 @@ pub(crate) use pair::{
 };
 pub(crate) use quantity::Understood;
 pub use quantity::quantity_of_unit;
+pub(crate) use rate_error::RateError;
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};
 pub(crate) use shapes::{shape_array, shaped_mode};
@@ -62,19 +64,6 @@ use afmid_pipeline::{Array, Attribute, StageError};
 
 /// Samples per second.
 pub(crate) const SAMPLE_RATE_HZ: &str = "sample_rate_hz";
-
-/// Standard error of that rate, relative; there where it is not 0.
-pub(crate) const RATE_RELATIVE_STD: &str = "sample_rate_relative_std";
-
-/// An array with the standard error of its rate, if that is not known exactly.
-pub(crate) fn with_rate_std(array: Array, relative_std: f64) -> Array {
-    if relative_std > 0.0 { array.attribute(RATE_RELATIVE_STD, relative_std) } else { array }
-}
-
-/// The standard error of an array's rate, relative.
-pub(crate) fn rate_std_of(array: &Array) -> f64 {
-    array.attributes.get(RATE_RELATIVE_STD).map_or(0.0, |_| array.number(RATE_RELATIVE_STD).unwrap_or(0.0))
-}
 
 /// The rate that an array states: also one of a plugin or of Python. Errors: it states none, or what is none.
 pub(crate) fn sample_rate_of(array: &Array) -> Result<f64, StageError> {

@@ -2,7 +2,7 @@
 
 use afmid_pipeline::{Array, Attribute, Axis, StageError, Values};
 
-use super::{DataSet, KIND, SAMPLE_RATE_HZ, copy_attributes, sample_rate_of};
+use super::{DataSet, KIND, RateError, SAMPLE_RATE_HZ, copy_attributes, sample_rate_of};
 
 const FORCE: &str = "force";
 const FORCE_NEWTON: &str = "force_newton";
@@ -37,6 +37,11 @@ impl<'a> Pair<'a> {
     /// Samples per second. Errors: not stated.
     pub fn sample_rate_hz(&self) -> Result<f64, StageError> {
         sample_rate_of(self.array)
+    }
+
+    /// How well that is known.
+    pub fn rate_error(&self) -> RateError {
+        RateError::of(self.array)
     }
 
     /// First samples of its records, where several lie in a row; none of one.
@@ -244,6 +249,7 @@ impl<'a> Pair<'a> {
             time: time[first..].to_vec(),
             unit: response.unit.clone(),
             rate: self.sample_rate_hz()?,
+            rate_error: self.rate_error(),
         })
     }
 }
@@ -256,6 +262,7 @@ pub(crate) struct PairSeries {
     pub time: Vec<f64>,
     pub unit: String,
     pub rate: f64,
+    pub rate_error: RateError,
 }
 
 /// A pair to be made: its sets are added to it.

@@ -11,6 +11,7 @@ use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free};
 use super::sensitivity::SensitivitySummary;
+use crate::artifacts::RateError;
 use afmid_kernels::calibration::{Estimate, SpringConstant, ThermalGauge, UNIFORM_BEAM_FACTOR, spring_constant};
 use afmid_kernels::signal::{Detrend, Welch};
 use afmid_kernels::spectra::{Fitted, ThermalFit};
@@ -145,7 +146,7 @@ pub struct RelativeErrors {
 impl Stage for ThermalStiffness {
     const SPEC: Spec = Spec {
         name: "calibration.stiffness",
-        version: 2,
+        version: 3,
         summary: "spring constant from the thermal peak of mode 1 in the free stretches",
         inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
         outputs: &[SPECTRUM.spec(), SUMMARY.spec()],
@@ -188,6 +189,8 @@ impl Stage for ThermalStiffness {
         let peak = self.peak.fit(&average).map_err(StageError::from_error)?;
         let estimate = |fitted: Fitted| Estimate { value: fitted.value, std: fitted.std };
         let variance = estimate(peak.variance);
+        let mut frequency_hz = estimate(peak.frequency_hz);
+        frequency_hz.std = RateError::of_records(records).widened(frequency_hz.value, frequency_hz.std);
         let k = spring_constant(peak.frequency_hz.value, variance, &gauge).map_err(StageError::from_error)?;
         warn(&peak, &k, cx);
         let frequencies = average.frequency_hz();
@@ -202,7 +205,7 @@ impl Stage for ThermalStiffness {
             apparent_n_per_m: k.apparent_n_per_m,
             sensitivity_v_per_m: k.sensitivity_v_per_m,
             contact_stiffness_n_per_m: gauge.contact_stiffness_n_per_m,
-            frequency_hz: estimate(peak.frequency_hz),
+            frequency_hz,
             quality_factor: estimate(peak.quality_factor),
             variance_v2: variance,
             white_v2_per_hz: peak.white.value,

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free};
+use crate::artifacts::RateError;
 use afmid_kernels::calibration::{Stability, stability};
 use afmid_kernels::signal::{AveragedPeriodogram, Detrend, Welch};
 use afmid_kernels::spectra::ThermalFit;
@@ -61,7 +62,7 @@ const SUMMARY: Port<Document> = Port::new("summary", "summary", "whether anythin
 impl Stage for Thermal {
     const SPEC: Spec = Spec {
         name: "calibration.thermal",
-        version: 2,
+        version: 3,
         summary: "thermal spectra per record, and tests for a change of the system over the archive",
         inputs: &[RECORDS.spec()],
         outputs: &[SPECTRA.spec(), PEAKS.spec(), SUMMARY.spec()],
@@ -221,11 +222,18 @@ fn table(records: &[Record], spectra: &[Option<AveragedPeriodogram>], peaks: &[R
         );
     for (quantity, unit, value, std) in QUANTITIES {
         let of = |pick: Pick| -> Vec<f64> { peaks.iter().map(|p| p.as_ref().map_or(f64::NAN, pick)).collect() };
-        table = table.with(quantity, unit, &format!("{quantity} of the thermal spectrum"), of(value)).with(
+        let (values, mut stds) = (of(value), of(std));
+        if unit == "Hz" {
+            // not in the tests of scatter and drift: records of one device have one clock
+            for ((std, value), record) in stds.iter_mut().zip(&values).zip(records) {
+                *std = RateError { relative_std: record.rate_relative_std }.widened(*value, *std);
+            }
+        }
+        table = table.with(quantity, unit, &format!("{quantity} of the thermal spectrum"), values).with(
             &format!("{quantity}_std"),
             unit,
             "its standard error",
-            of(std),
+            stds,
         );
     }
     table

@@ -10,7 +10,7 @@ use super::causes_story::{error_array, error_table, ladder};
 use super::chosen::{check_ids, wanted};
 use super::runs::{Lowered, Restored};
 use super::{closed_loop, several_inputs, steady};
-use crate::artifacts::{Decays, Pair};
+use crate::artifacts::{Decays, Pair, RateError};
 use afmid_kernels::diagnosis::verdict::Diagnosis;
 use afmid_kernels::diagnosis::{DiagnosisError, DiagnosisOptions, Sensed, Simulation, Story};
 
@@ -156,7 +156,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 8,
+        version: 9,
         summary: "names what a linear model gets wrong: inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec(), MODEL.spec()],
@@ -180,7 +180,11 @@ impl Stage for CausesDiagnose {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let wired = (inputs.get(&PAIR).ok(), inputs.get(&DECAYS).ok(), inputs.get(&RECORDS).ok());
-        let answer = match wired {
+        let rate_error = match wired {
+            (Some(array), ..) | (_, Some(array), _) => RateError::of(array),
+            (.., records) => records.map_or_else(RateError::default, |records| RateError::of_records(&records.records)),
+        };
+        let mut answer = match wired {
             (Some(pair), None, None) if !self.reference.is_empty() => {
                 let pair = Pair::new(pair);
                 if pair.taken_off() != "none" {
@@ -219,6 +223,10 @@ impl Stage for CausesDiagnose {
                     .help("wire `pair` from io.columns, `decays` from events.decay or `records` from io.records"));
             }
         };
+        let Diagnosis { modes_before, modes_after, .. } = &mut answer.diagnosis;
+        for mode in modes_before.iter_mut().chain(modes_after) {
+            mode.frequency_std_hz = mode.frequency_std_hz.map(|std| rate_error.widened(mode.frequency_hz, std));
+        }
         Ok(Ports::new()
             .with(&SUMMARY, Document::new(&answer.diagnosis)?)
             .with(&LADDER, ladder(&answer.diagnosis))

@@ -51,7 +51,7 @@ const LAG_LIMIT_SAMPLES: f64 = 0.1;
 impl Stage for Average {
     const SPEC: Spec = Spec {
         name: "ensemble.average",
-        version: 1,
+        version: 2,
         summary: "averages aligned events, all of them and two random halves, and tells noise from scatter",
         inputs: &[ENSEMBLE.spec()],
         outputs: &[AVERAGE.spec(), SUMMARY.spec()],
@@ -89,7 +89,7 @@ impl Stage for Average {
             }
         }
         average = per_event(average, &whole, split.as_ref(), rate, unit);
-        ensemble.describe(&mut average);
+        let average = ensemble.described(average);
         let summary = Document::new(&json!({
             "events": rows.rows(),
             "identification": split.as_ref().map(|s| &s.identification),

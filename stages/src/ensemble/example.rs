@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use afmid_kernels::events::EventKind;
 use afmid_pipeline::Array;
 
-use crate::artifacts::{DataSet, NewEnsemble, NewPair, PairSet};
+use crate::artifacts::{DataSet, NewEnsemble, NewPair, PairSet, RateError};
 
 /// Sample rate of the examples.
 pub(crate) const SAMPLE_RATE_HZ: f64 = 5e6;
@@ -50,7 +50,8 @@ pub(crate) fn ensemble() -> Array {
 pub(crate) fn ensemble_of(signal: Vec<f64>, events: usize, samples: usize) -> Array {
     let (sample_rate_hz, onset_sample) = (SAMPLE_RATE_HZ, T0);
     let (kind, unit) = (Some(EventKind::SnapOff), "V");
-    NewEnsemble { signal: signal.into(), events, samples, sample_rate_hz, onset_sample, kind, unit }.array()
+    let rate_error = RateError::default();
+    NewEnsemble { signal: signal.into(), events, samples, sample_rate_hz, rate_error, onset_sample, kind, unit }.array()
 }
 
 /// A pair of the sets given: the force held until the release, and these responses.

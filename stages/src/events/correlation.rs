@@ -11,7 +11,7 @@ use super::extraction::{ExtractionSettings, extract};
 use super::listing::{Listed, ensemble_array, events_table, summary};
 use super::segments::{Searched, Segments, Stretch};
 use super::window::{WindowSettings, Windows, cut_windows, quality_outliers};
-use crate::artifacts::{NewEnsemble, deflection};
+use crate::artifacts::{NewEnsemble, RateError, deflection};
 use afmid_kernels::events::{Aligned, AveragingSettings, EventKind, Misfit, correlation_average};
 
 /// Finds snap-off or snap-to-contact events in records and aligns them by iterative correlation averaging.
@@ -97,7 +97,7 @@ impl Stage for Correlation {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.correlation",
-        version: 4,
+        version: 5,
         summary: "finds snap-off or snap-to-contact events and aligns them by iterative correlation averaging",
         inputs: &[RECORDS.spec()],
         outputs: &[ENSEMBLE.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -132,6 +132,7 @@ impl Stage for Correlation {
             events: listed.kept(),
             samples: self.window_samples,
             sample_rate_hz: rate,
+            rate_error: RateError::of_records(records),
             onset_sample: self.pre_samples(),
             kind: Some(self.kind),
             unit,

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::decay_rows::{Row, all_noise, nothing_found, summary, table};
-use crate::artifacts::{FORCE, PIEZO, Sensor, decay_array, with_rate_std};
+use crate::artifacts::{FORCE, PIEZO, RateError, Sensor, decay_array};
 use crate::io::{CopyOf, warn_of_copies};
 use afmid_kernels::events::decay::{DecaySearch, DecaySearchOptions, DecayTrigger, DismissedReason, FreeDecay};
 use afmid_kernels::harmonics::find_decays_beside_lines;
@@ -121,10 +121,10 @@ impl Stage for Decay {
             cx.warn(format!("{}: {}", row.record, row.rejected));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();
-        let rate_std = records.iter().map(|record| record.rate_relative_std).fold(0.0, f64::max);
+        let rate_error = RateError::of_records(records);
         let summary = summary(&rows, hits.len(), &sensors, rate)?;
         Ok(Ports::new()
-            .with(&DECAYS, with_rate_std(decay_array(&hits, &quiet, &sensors, rate)?, rate_std))
+            .with(&DECAYS, rate_error.stated_by(decay_array(&hits, &quiet, &sensors, rate)?))
             .with(&EVENTS, table(&rows, rate))
             .with(&SUMMARY, summary))
     }

@@ -82,7 +82,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "load
 impl Stage for Extrapolation {
     const SPEC: Spec = Spec {
         name: "force.extrapolation",
-        version: 2,
+        version: 3,
         summary: "derives force input and response from the lines before and after the averaged event",
         inputs: &[AVERAGE.spec(), CALIBRATION.spec()],
         outputs: &[PAIR.spec(), SUMMARY.spec()],
@@ -144,6 +144,7 @@ impl Stage for Extrapolation {
             sets.push((set, own));
             counts.extend(average.count(set).map(|count| (set, count.clone())));
         }
+        let result = average.events().rate_error().stated_by(result);
         let result = with_counts(result, &counts, lines.onset.ambiguity() / rate)
             .attribute("load_v", lines.load)
             .attribute("load_std_v", lines.load_std);

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::pem::{MODEL, PAIR};
-use crate::artifacts::{DataSet, Ensemble, Pair, SAMPLE_RATE_HZ, innovations};
+use crate::artifacts::{DataSet, Ensemble, Pair, RateError, SAMPLE_RATE_HZ, innovations};
 use crate::ensemble::{Rows, moments, scatter};
 use crate::watched::Watched;
-use afmid_kernels::modes::LEVEL;
+use afmid_kernels::modes::{Interval, LEVEL};
 use afmid_kernels::validation::{BootstrapSettings, Bootstrapped, Drawing, Intervals, RootInterval};
 
 /// Intervals on poles, zeros, gain, delay and frequency response from the events themselves: block bootstrap.
@@ -78,7 +78,7 @@ impl Stage for BootstrapIntervals {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.bootstrap",
-        version: 3,
+        version: 4,
         summary: "intervals on poles, zeros, gain, delay and frequency response by resampling events",
         inputs: &[ENSEMBLE.spec(), PAIR.spec(), MODEL.spec()],
         outputs: &[ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -111,7 +111,15 @@ impl Stage for BootstrapIntervals {
             drift: self.drift,
         };
         let settings = BootstrapSettings { seed: cx.seed(), ..self.drawing };
-        let found = drawing.intervals(&settings, &Watched(cx)).map_err(StageError::from_error)?;
+        let mut found = drawing.intervals(&settings, &Watched(cx)).map_err(StageError::from_error)?;
+        let rate_error = RateError::of_model(artifact);
+        found.roots.iter_mut().for_each(|root| widen(&mut root.frequency, rate_error));
+        // without what the hold adds
+        let hold_s = self.intersample.delay_s(model.sample_time_s);
+        let delay = &mut found.delay_s;
+        (delay.value, delay.interval.low, delay.interval.high) =
+            (delay.value - hold_s, delay.interval.low - hold_s, delay.interval.high - hold_s);
+        widen(delay, rate_error);
         let unknown = found.roots.iter().filter(|root| root.frequency.std.is_nan()).count();
         if unknown > 0 {
             cx.warn(format!("{unknown} roots are missing from half of the replicates or more and have no interval"));
@@ -120,8 +128,8 @@ impl Stage for BootstrapIntervals {
             "events": events.len(),
             "replicates": self.drawing.replicates,
             "level": LEVEL,
-            "gain": document(&found.gain, 0.0),
-            "delay_s": document(&found.delay_s, self.intersample.delay_s(model.sample_time_s)),
+            "gain": document(&found.gain),
+            "delay_s": document(&found.delay_s),
         }))?;
         Ok(Ports::new()
             .with(&ROOTS, root_table(&found.roots))
@@ -157,18 +165,21 @@ impl BootstrapIntervals {
     }
 }
 
-/// A number as JSON, less what the hold adds.
-fn document(found: &Bootstrapped, less: f64) -> Value {
-    json!({
-        "value": found.value - less,
-        "std": found.std,
-        "low": found.interval.low - less,
-        "high": found.interval.high - less,
-    })
+/// Adds the error of the sample rate to a number that scales with it or with one over it.
+fn widen(found: &mut Bootstrapped, rate_error: RateError) {
+    let Interval { low, high } = found.interval;
+    let (low, high) = rate_error.widened_ends(found.value, (low, high));
+    found.interval = Interval { low, high };
+    found.std = rate_error.widened(found.value, found.std);
+}
+
+/// A number as JSON.
+fn document(found: &Bootstrapped) -> Value {
+    json!({ "value": found.value, "std": found.std, "low": found.interval.low, "high": found.interval.high })
 }
 
 fn root_table(roots: &[RootInterval]) -> Table {
-    let std = "standard deviation of the replicates";
+    let std = "standard deviation of the replicates, with the error of the rate";
     let quality = "magnitude of s over minus twice its real part";
     Table::of(roots)
         .with("kind", "", "pole or zero", |r| if r.pole { "pole" } else { "zero" })

@@ -112,7 +112,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 12,
+        version: 13,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],
@@ -135,7 +135,7 @@ impl Stage for DecayFit {
             None => follow_channels(&decays.hits, &decays.quiet, interval_s, &options, motion),
         };
         let mut followed = followed.map_err(StageError::from_error)?;
-        followed.add_error_of_rate(decays.rate_relative_std);
+        followed.add_error_of_rate(decays.rate_error.relative_std);
         let parts = Parts::new(&followed, &decays, motion);
         let fit = &followed.fit;
         self.warn(fit, followed.fitted.poles.len(), &decays, cx);
@@ -301,7 +301,7 @@ mod tests {
         let sensor = crate::at_hand::Named { name: "angle".to_owned(), unit: "rad".to_owned() };
         for relative_std in [0.0, 1e-3] {
             let decays = crate::at_hand::decays(&[vec![ring.clone()]], std::slice::from_ref(&sensor), 1.0 / interval_s);
-            let decays = decays.unwrap().attribute(crate::artifacts::RATE_RELATIVE_STD, relative_std);
+            let decays = crate::artifacts::RateError { relative_std }.stated_by(decays.unwrap());
             let found = DecayFit::default().run(&Ports::new().with(&DECAYS, decays), &Context::alone(0)).unwrap();
             let (modes, course) = (found.get(&MODES).unwrap(), found.get(&COURSE).unwrap());
             assert_eq!((modes.rows(), course.rows()), (1, 12), "{modes:?}");

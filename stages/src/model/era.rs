@@ -52,7 +52,7 @@ impl Default for EraEstimate {
 impl Stage for EraEstimate {
     const SPEC: Spec = Spec {
         name: "model.era",
-        version: 5,
+        version: 6,
         summary: "estimates a state-space model from a free decay: eigensystem realization",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

@@ -75,7 +75,7 @@ impl Stage for FrfModeFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.frf_modes",
-        version: 5,
+        version: 6,
         summary: "fits modes and mode shapes to measured frequency responses of many channels",
         inputs: &[FRF.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), DIAGRAM.spec(), FIT.spec(), SUMMARY.spec()],
@@ -93,7 +93,8 @@ impl Stage for FrfModeFit {
         let frf = Frf::new(inputs.get(&FRF)?)?;
         let names = channels(&frf);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let found = self.fitted(&frf, &names)?;
+        let mut found = self.fitted(&frf, &names)?;
+        found.modes.iter_mut().for_each(|mode| frf.rate_error.widen(&mut mode.estimate.frequency_hz));
         Remarks { fit: self, found: &found, frf: &frf }.all().into_iter().for_each(|remark| cx.warn(remark));
         let shapes: Vec<&ModeShape> = found.modes.iter().map(|mode| &mode.shape).collect();
         let modes: Vec<ModeEstimate> = found.modes.iter().map(|mode| mode.estimate).collect();

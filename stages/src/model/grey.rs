@@ -1,6 +1,7 @@
 //! The stage `model.grey`.
 
 mod between;
+mod rate_error;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use self::between::{between_document, name_of};
+use self::rate_error::widen;
 use self::tables::{mode_table, named, parameter_table, static_gain, with_interval};
 use super::excitation::require_more_than_a_sine;
 use super::known::KnownNumber;
@@ -99,7 +101,7 @@ impl Stage for GreyEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.grey",
-        version: 9,
+        version: 10,
         summary: "fits modes, real poles, delay and feedthrough: the grey modal form",
         inputs: &[PAIR.spec(), START.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec(), MODES.spec(), PARAMETERS.spec()],
@@ -131,13 +133,15 @@ impl Stage for GreyEstimate {
             cx.warn(one.problem);
         }
         let experiment = Experiment { input: &series.input, output: &series.output };
-        let fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
+        let mut fit = fit_grey(&[experiment], 1.0 / rate, &options).map_err(StageError::from_error)?;
+        widen(&mut fit, series.rate_error);
         let test = residual_test(&fit);
         self.warn(&fit, &test, &series.output, cx);
         let identified = identified(&fit, &series)?;
         let mut model = state_space(&identified, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
+        series.rate_error.state_in(&mut model);
         model.attributes.insert("delay_s".to_owned(), fit.model.delay_s.into());
         model.attributes.insert("input_between_samples".to_owned(), name_of(fit.model.between).into());
         model.attributes.insert("dead_samples".to_owned(), fit.discrete.dead_samples.into());

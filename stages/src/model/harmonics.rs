@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::artifacts::PIEZO;
+use crate::artifacts::{PIEZO, RateError};
 use afmid_kernels::harmonics::{Harmonic, HarmonicFit, HarmonicOptions, fit_harmonics};
 
 /// Fits a steady oscillation: its frequency, its harmonics, and whether it is steady.
@@ -51,7 +51,7 @@ impl Stage for Harmonics {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.harmonics",
-        version: 3,
+        version: 4,
         summary: "fits a steady oscillation: frequency, harmonics, and whether it is steady",
         inputs: &[RECORDS.spec()],
         outputs: &[HARMONICS.spec(), SUMMARY.spec()],
@@ -108,8 +108,10 @@ struct Fitted {
 impl Harmonics {
     fn fitted(&self, record: &Record, channel: &Channel) -> Result<Fitted, StageError> {
         let values = channel.read(0, channel.samples.min(self.most_samples))?;
-        let fit = fit_harmonics(&values, record.sample_rate_hz, &self.fit)
+        let mut fit = fit_harmonics(&values, record.sample_rate_hz, &self.fit)
             .map_err(|error| StageError::from_error(error).at(&record.path))?;
+        let rate_error = RateError { relative_std: record.rate_relative_std };
+        fit.frequency_std_hz = rate_error.widened(fit.frequency_hz, fit.frequency_std_hz);
         Ok(Fitted { record: record.name.clone(), channel: channel.location.clone(), unit: channel.unit.clone(), fit })
     }
 }

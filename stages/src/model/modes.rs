@@ -17,8 +17,8 @@ use self::driven::mark_unexcited;
 use self::none::no_mode;
 use super::pem::MODEL;
 use crate::artifacts::{
-    DataSet, Pair, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_document, mode_table, nuisances,
-    root_table, t0_ambiguity_s,
+    DataSet, Pair, RateError, SAMPLE_RATE_HZ, first_sample, further_inputs, innovations, mode_document, mode_table,
+    nuisances, root_table, t0_ambiguity_s,
 };
 use afmid_kernels::model::InnovationsModel;
 use afmid_kernels::modes::{
@@ -102,7 +102,7 @@ impl Stage for Modes {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.modes",
-        version: 11,
+        version: 12,
         summary: "extracts modes, poles and zeros with standard errors, and the held-out fit",
         inputs: &[MODEL.spec(), HALF.spec(), PAIR.spec()],
         outputs: &[MODES.spec(), ROOTS.spec(), RESPONSE.spec(), SUMMARY.spec()],
@@ -135,7 +135,9 @@ impl Stage for Modes {
             let from_onset = share_error_from_onset(pole.amplitude, pole.root.s, ambiguity_s.unwrap_or(0.0));
             pole.static_share_std = pole.static_share_std.hypot(from_onset);
         }
-        let zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
+        let mut zeros = zeros(&model, &covariance).map_err(StageError::from_error)?;
+        let rate_error = RateError::of_model(artifact);
+        found.iter_mut().map(|pole| &mut pole.root).chain(&mut zeros).for_each(|root| rate_error.widen_root(root));
         let of = |kind: PoleClass| found.iter().filter(|pole| pole.kind == kind).collect::<Vec<&Pole>>();
         let modes = of(PoleClass::Mechanical);
         let listed = |kind: PoleClass| of(kind).into_iter().map(with_share).collect::<Vec<Value>>();
@@ -163,7 +165,7 @@ impl Stage for Modes {
                 "noise_ceiling": fits.noise_ceiling,
             },
             "t0_ambiguity_s": ambiguity_s,
-            "at_rest": self.at_rest(&model, &covariance)?,
+            "at_rest": self.at_rest(&model, &covariance, rate_error)?,
             "reference": self.compared(&modes),
         }))?;
         Ok(Ports::new()
@@ -184,16 +186,22 @@ impl Modes {
     }
 
     /// Gain and delay with their intervals.
-    fn at_rest(&self, model: &InnovationsModel, covariance: &Mat<f64>) -> Result<Value, StageError> {
+    fn at_rest(
+        &self,
+        model: &InnovationsModel,
+        covariance: &Mat<f64>,
+        rate_error: RateError,
+    ) -> Result<Value, StageError> {
         let rest = at_rest(model, covariance).map_err(StageError::from_error)?;
         let hold_s = self.intersample.delay_s(model.sample_time_s);
+        let delay_s = rest.delay_s - hold_s;
         let with_interval = |value: f64, std: f64| {
             let Interval { low, high } = Interval::normal(value, std);
             json!({ "value": value, "std": std, "low": low, "high": high })
         };
         Ok(json!({
             "gain": with_interval(rest.gain, rest.gain_std),
-            "delay_s": with_interval(rest.delay_s - hold_s, rest.delay_std_s),
+            "delay_s": with_interval(delay_s, rate_error.widened(delay_s, rest.delay_std_s)),
             "level": LEVEL,
         }))
     }

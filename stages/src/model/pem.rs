@@ -91,7 +91,7 @@ impl Stage for Pem {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.pem",
-        version: 13,
+        version: 14,
         summary: "identifies a state-space model in innovations form by the prediction error method",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), RESIDUALS.spec(), SUMMARY.spec()],
@@ -144,6 +144,7 @@ impl Stage for Pem {
         let mut model = state_space(&fit, self.set, first)?;
         state_nuisances(&mut model, Nuisances { offset: self.fit.offset, slope: self.fit.drift });
         state_t0_ambiguity(&mut model, pair.t0_ambiguity_s());
+        pair.rate_error().state_in(&mut model);
         let residual = fit.residuals.into_iter().next().unwrap_or_default();
         let prediction = output.iter().zip(&residual).map(|(y, e)| y - e).collect::<Vec<f64>>();
         let residuals = Array::over(vec![Axis::new("time", "s", "time since t0", time)])

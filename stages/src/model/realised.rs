@@ -42,6 +42,7 @@ impl Realised<'_> {
         let fit = with_poles(&[experiment], 1.0 / series.rate, poles, &options).map_err(StageError::from_error)?;
         let mut model = state_space(&fit, self.set, self.first)?;
         state_nuisances(&mut model, self.nuisances());
+        series.rate_error.state_in(&mut model);
         Ok(Ports::new().with(&MODEL, model).with(&SUMMARY, self.summary(&fit, unstable, series)?))
     }
 

@@ -147,7 +147,7 @@ impl Stage for RingdownFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.ringdown",
-        version: 5,
+        version: 6,
         summary: "fits the modes of all events jointly, at the limit of their noise",
         inputs: &[ENSEMBLE.spec(), FREE.spec()],
         outputs: &[MODES.spec(), EVENTS.spec(), SPECTRUM.spec(), POLES.spec(), SUMMARY.spec()],
@@ -189,9 +189,11 @@ impl Stage for RingdownFit {
         let options = RingdownOptions { missing: gaps, ..self.options(cx.seed())? };
         let (fit, seen) = self.fitted(&events, &borrowed, 1.0 / rate, &options, cx)?;
         self.warn(&fit, &seen, cx);
-        let modes = self.estimates(&fit, cx)?;
+        let mut modes = self.estimates(&fit, cx)?;
+        let rate_error = ensemble.rate_error();
+        rate_error.widen_modes(&mut modes);
         Ok(Ports::new()
-            .with(&MODES, mode_table(&fit, &modes))
+            .with(&MODES, mode_table(&fit, &modes, rate_error))
             .with(&EVENTS, event_table(&fit))
             .with(&SPECTRUM, spectrum(&fit))
             .with(&POLES, poles(&fit, self.error_source))

@@ -3,7 +3,8 @@
 use afmid_pipeline::{Array, Axis, Context, Document, Port, Ports, Stage, StateSpace, Table};
 
 use super::order::Order;
-use super::{FrfModeFit, Modes, Pem, SubspaceEstimate};
+use super::{FrfModeFit, GreyEstimate, Modes, Pem, RingdownFit, SubspaceEstimate};
+use crate::artifacts::RateError;
 use crate::fixture::white_noise;
 use crate::spectrum::MeasuredFrf;
 
@@ -112,5 +113,40 @@ fn offsets_and_what_was_before_the_onset_move_no_pole_beyond_its_error() {
         }
         // the truth
         assert!((f - 61.0).abs() < 4.0 * f_std && (q - 25.0).abs() < 4.0 * q_std, "{name}: {f}({f_std}) {q}({q_std})");
+    }
+}
+
+fn by_grey(pair: &Array) -> Found {
+    let mut stage = GreyEstimate::default();
+    (stage.fit.modes, stage.fit.real_poles) = (1, 0);
+    let fitted = stage.run(&Ports::new().with(&PAIR, pair.clone()), &Context::alone(0)).unwrap();
+    only(fitted.get(&MODES).unwrap())
+}
+
+fn by_ringdown(ensemble: &Array) -> Found {
+    let mut stage = RingdownFit { modes: super::count::Count::Fixed(1), ..RingdownFit::default() };
+    stage.fit.real_poles = 0;
+    let inputs = Ports::new().with(&Port::<Array>::new("ensemble", "ensemble", ""), ensemble.clone());
+    only(stage.run(&inputs, &Context::alone(0)).unwrap().get(&MODES).unwrap())
+}
+
+#[test]
+fn the_error_of_the_rate_goes_into_that_of_frequencies_and_into_nothing_else() {
+    let record = pair(record(4096, 0));
+    let by: [(&str, fn(&Array) -> Found, Array); 5] = [
+        ("pem", by_pem, record.clone()),
+        ("subspace", by_subspace, record.clone()),
+        ("grey", by_grey, record.clone()),
+        ("responses", by_responses, record),
+        ("ringdown", by_ringdown, crate::ensemble::example::ensemble()),
+    ];
+    let relative_std = 1e-2;
+    for (name, by, known) in by {
+        let [f, std, quality, quality_std] = by(&known);
+        let wider = by(&RateError { relative_std }.stated_by(known));
+        // two numbers added in squares: rounding
+        assert!((wider[1] / std.hypot(relative_std * f) - 1.0).abs() < 1e-9, "{name}: {wider:?}, {std}");
+        assert_eq!([wider[0], wider[2], wider[3]], [f, quality, quality_std], "{name}");
+        assert!(wider[1] > 2.0 * std, "{name}: {std} is not small beside {}", relative_std * f);
     }
 }

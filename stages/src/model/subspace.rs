@@ -68,7 +68,7 @@ impl Default for SubspaceEstimate {
 impl Stage for SubspaceEstimate {
     const SPEC: Spec = Spec {
         name: "model.subspace",
-        version: 8,
+        version: 9,
         summary: "estimates a state-space model by subspace methods: N4SID, MOESP, CVA weights",
         inputs: &[PAIR.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],

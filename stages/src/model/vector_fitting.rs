@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::realised::MODEL;
-use crate::artifacts::{DataSet, Transfer, state_space};
+use crate::artifacts::{DataSet, RateError, Transfer, state_space};
 use afmid_kernels::pem::{Ending, Identified, Verdict};
 use afmid_kernels::vector_fitting::{MeasuredResponse, VectorFit, VectorFitting, vector_fitting};
 
@@ -83,7 +83,7 @@ impl Stage for VectorFittingEstimate {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.vector_fitting",
-        version: 2,
+        version: 3,
         summary: "fits a rational transfer function to a frequency response: relaxed vector fitting in z",
         inputs: &[TRANSFER.spec()],
         outputs: &[MODEL.spec(), SUMMARY.spec()],
@@ -102,6 +102,7 @@ impl Stage for VectorFittingEstimate {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let given = Transfer::new(inputs.get(&TRANSFER)?)?;
+        let rate_error = RateError::of(inputs.get(&TRANSFER)?);
         let (frequency_hz, rate) = (given.frequency_hz, given.sample_rate_hz);
         let (transfer, variance) = self.sequences(&given);
         let settings = self.settings(&given)?;
@@ -127,7 +128,9 @@ impl Stage for VectorFittingEstimate {
             "gradient": fit.gradient,
             "unstable_poles": fit.unstable,
         }))?;
-        Ok(Ports::new().with(&MODEL, artifact(fit)?).with(&SUMMARY, summary))
+        let mut model = artifact(fit)?;
+        rate_error.state_in(&mut model);
+        Ok(Ports::new().with(&MODEL, model).with(&SUMMARY, summary))
     }
 
     fn examples() -> Vec<Example> {

@@ -4,6 +4,7 @@ use afmid_pipeline::{Array, Axis, Context, Ports, Stage};
 use rustfft::num_complex::Complex64;
 
 use super::{Etfe, Smoothing, SmoothingMethod, Window};
+use crate::artifacts::RateError;
 use crate::ensemble::Average;
 use crate::fixture::{Lever, white_noise};
 use crate::force::Extrapolation;
@@ -13,6 +14,7 @@ const SAMPLES: usize = 8192;
 const ONSET: usize = 1024;
 const EVENTS: usize = 16;
 const NOISE_V: f64 = 1.2e-3;
+const RATE_ERROR: RateError = RateError { relative_std: 1e-6 };
 /// The release lies between two samples.
 const T0: f64 = ONSET as f64 - 1.4;
 
@@ -50,11 +52,14 @@ fn run<S: Stage>(stage: &S, port: &str, input: &Array) -> Array {
 }
 
 fn chain(seed: u64, window: &Window, smoothing: &Smoothing) -> (Array, Array) {
-    let average = run(&Average::default(), "ensemble", &ensemble(seed));
+    let average = run(&Average::default(), "ensemble", &RATE_ERROR.stated_by(ensemble(seed)));
     let pair = run(&Extrapolation::default(), "average", &average);
     let windowed = run(window, "pair", &pair);
     let etfe = run(&Etfe::default(), "pair", &windowed);
-    (pair, run(smoothing, "etfe", &etfe))
+    let smoothed = run(smoothing, "etfe", &etfe);
+    // how well the rate is known goes along
+    [&pair, &smoothed].into_iter().for_each(|array| assert_eq!(RateError::of(array), RATE_ERROR));
+    (pair, smoothed)
 }
 
 /// The closed form, released `delay` samples before the `t0` that was found.

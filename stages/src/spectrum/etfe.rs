@@ -60,7 +60,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Etfe {
     const SPEC: Spec = Spec {
         name: "spectrum.etfe",
-        version: 2,
+        version: 3,
         summary: "estimates the transfer function as the ratio of the transforms of response and force",
         inputs: &[PAIR.spec()],
         outputs: &[ETFE.spec(), SUMMARY.spec()],
@@ -113,6 +113,7 @@ impl Stage for Etfe {
         }
         .array();
         pair.describe_kind(&mut result);
+        let result = pair.rate_error().stated_by(result);
         Ok(Ports::new().with(&ETFE, result).with(&SUMMARY, summary))
     }
 

@@ -64,7 +64,7 @@ pub(super) const SUMMARY: Port<Document> = Port::new("summary", "summary", "lags
 impl Stage for Frf {
     const SPEC: Spec = Spec {
         name: "spectrum.frf",
-        version: 1,
+        version: 2,
         summary: "estimates the frequency response from all events, with noise and distortion levels",
         inputs: &[ENSEMBLE.spec(), PAIR.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -167,8 +167,8 @@ fn frf_array(
         differenced: true,
         event_turns_per_bin,
     };
+    let response = ensemble.rate_error().stated_by(response.array());
     Ok(response
-        .array()
         .with("coherence", "1", "ordinary coherence", over, cut(&found.coherence))
         .with("scatter", "V^2", "scatter between events about the linear response", over, cut(&found.scatter))
         .with("noise", "V^2", "part of the scatter that is noise", over, cut(&found.noise))

@@ -80,6 +80,7 @@ impl<'a> Joining<'a> {
             input_noise: both(own.input_noise, &new.input_noise),
             responses: own.responses.iter().cloned().chain(later).collect(),
             driving_point,
+            rate_error: own.rate_error.larger(new.rate_error),
             averages: own.averages.zip(new.averages).map(|(ours, theirs)| ours.min(theirs)),
             ..new
         })

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::joined::Joining;
-use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, ResponseOf, Understood, rows_of};
+use crate::artifacts::{DataSet, NewFrf, Pair, Point, Quantity, RateError, ResponseOf, Understood, rows_of};
 use crate::io::{FRF, Roving, same_values, varies};
 use afmid_kernels::spectra::{
     Block, BlockKind, Estimator, MeasuredResponse, ResponseSettings, common_hit_samples, frequency_response,
@@ -188,7 +188,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for MeasuredFrf {
     const SPEC: Spec = Spec {
         name: "spectrum.measured_frf",
-        version: 7,
+        version: 8,
         summary: "estimates the frequency response from measured input and output with coherence and variance",
         inputs: &[PAIR.spec(), BEFORE.spec()],
         outputs: &[FRF.spec(), SUMMARY.spec()],
@@ -230,7 +230,7 @@ impl Stage for MeasuredFrf {
         understood.remark.iter().for_each(|remark| cx.warn(remark));
         let summary = self.summary(&found, &kept, blocks.len())?;
         let responses = self.responses(pair.channel_names(record.inputs.len(), record.outputs.len()))?;
-        let mut frf = self.frf(found, &kept, responses, understood, rate)?;
+        let mut frf = self.frf(found, &kept, responses, understood, (rate, pair.rate_error()))?;
         if let Some(before) = before {
             frf = before.join(frf)?;
             before.remark(&frf).into_iter().for_each(|remark| cx.warn(remark));
@@ -369,7 +369,7 @@ impl MeasuredFrf {
         bins: &[usize],
         responses: Vec<ResponseOf>,
         Understood { quantity, unit, factor, .. }: Understood,
-        rate: f64,
+        (rate, rate_error): (f64, RateError),
     ) -> Result<NewFrf, StageError> {
         let kept = |rows: Vec<Vec<f64>>, factor: f64| -> Vec<f64> {
             rows.iter().flat_map(|row| bins.iter().map(|&bin| row[bin] * factor)).collect()
@@ -392,6 +392,7 @@ impl MeasuredFrf {
             unit,
             driving_point: self.driving_point.map(|number| number - 1),
             sample_rate_hz: Some(rate),
+            rate_error,
             averages: Some(found.averages),
             added_decay_per_s: self.added_decay_per_s,
         })

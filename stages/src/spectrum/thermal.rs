@@ -80,7 +80,7 @@ impl Stage for Thermal {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "spectrum.thermal",
-        version: 3,
+        version: 4,
         summary: "fits resonance, quality factor and noise levels to a thermal spectrum",
         inputs: &[DENSITY.spec()],
         outputs: &[FIT.spec(), LINES.spec(), SUMMARY.spec()],
@@ -104,11 +104,13 @@ impl Stage for Thermal {
         let (f, p) = self.band(density.frequency_hz, density.density)?;
         let through = self.through(&density)?;
         let data = AveragedDensity { frequency_hz: f, density: p, averages: density.averages, through };
-        let fit = thermal_fit(data, self.fit).map_err(StageError::from_error)?;
+        let mut fit = thermal_fit(data, self.fit).map_err(StageError::from_error)?;
         let chance = resonance_chance(&data, &fit);
         if chance >= RESONANCE_FALSE_ALARM {
             return Err(no_resonance(&fit, chance));
         }
+        let (hz, rate_error) = (&mut fit.frequency_hz, density.rate_error());
+        (hz.std, hz.robust_std) = (rate_error.widened(hz.value, hz.std), rate_error.widened(hz.value, hz.robust_std));
         self.warn(&fit, f, data.averages, cx);
         Ok(Ports::new()
             .with(&FIT, fit_array(f, p, &fit, density.unit))

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::artifacts::{NewDensity, SAMPLE_RATE_HZ, deflection};
+use crate::artifacts::{NewDensity, RateError, SAMPLE_RATE_HZ, deflection};
 use crate::calibration::FreeSettings;
 use crate::calibration::reading::{common_rate, push_free, read_blocks, read_free};
 use crate::io::DENSITY;
@@ -67,7 +67,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Welch {
     const SPEC: Spec = Spec {
         name: "spectrum.welch",
-        version: 2,
+        version: 3,
         summary: "averages periodograms of free stretches into a density with its uncertainty",
         inputs: &[RECORDS.spec()],
         outputs: &[DENSITY.spec(), SUMMARY.spec()],
@@ -140,6 +140,7 @@ impl Stage for Welch {
             .attribute("segments", average.segments)
             .attribute("equivalent_noise_bandwidth_hz", 1.5 * bin_hz)
             .attribute(SAMPLE_RATE_HZ, rate);
+        let density = RateError::of_records(records).stated_by(density);
         Ok(Ports::new().with(&DENSITY, density).with(&SUMMARY, summary))
     }
 

@@ -215,6 +215,9 @@ impl Channels {
             Some(_) => error,
             None => error.help("give `sample_rate_hz` (1 for cycles per sample) or the channel `time`"),
         })?;
+        if wanted.sample_rate_hz.is_none() {
+            agreed.relative_std = self.all().map(|channel| channel.rate_relative_std).fold(0.0, f64::max);
+        }
         let times = || contradiction(&file.contents().channels, rated, wanted.sample_rate_hz?);
         agreed.overruled = agreed.overruled.or_else(times);
         if rated.rate_is_guess && wanted.sample_rate_hz.is_none() {

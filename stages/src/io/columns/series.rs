@@ -6,9 +6,7 @@ use serde_json::{Value, json};
 use super::part::Part;
 use super::stage::Columns;
 use super::stretch::{Removal, Stretch, Trend, halves};
-use crate::artifacts::{
-    DataSet, NewPair, PairSet, with_channel_names, with_rate_std, with_record_starts, with_taken_off,
-};
+use crate::artifacts::{DataSet, NewPair, PairSet, RateError, with_channel_names, with_record_starts, with_taken_off};
 
 /// Inputs and outputs of all files in a row, NaN where missing.
 pub(super) struct Series {
@@ -27,6 +25,7 @@ impl Series {
         let mut records = vec![Stretch { first: 0, end: all.samples }];
         for part in parts {
             let first = all.samples;
+            all.rate_relative_std = all.rate_relative_std.max(part.rate_relative_std);
             let own = all.inputs.iter_mut().chain(&mut all.outputs);
             own.zip(part.inputs.iter().chain(&part.outputs)).for_each(|(own, more)| own.extend_from_slice(more));
             all.gaps.push(first);
@@ -103,7 +102,7 @@ impl Series {
             };
             pair = of_set.add(pair);
         }
-        let pair = with_rate_std(pair, self.all.rate_relative_std);
+        let pair = RateError { relative_std: self.all.rate_relative_std }.stated_by(pair);
         let mut pair = with_channel_names(pair, &self.all.input_names, &self.all.output_names);
         if !self.records.is_empty() {
             let starts: Vec<usize> = self.records.iter().map(|record| record.first).collect();
