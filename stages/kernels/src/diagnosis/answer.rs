@@ -4,18 +4,17 @@ use std::collections::BTreeMap;
 
 use super::data::{Bench, Part, PartStart, Record};
 use super::dynamics::Kind;
-use super::fit::{Blocks, FOLDS, Fit, Until};
+use super::fit::{Blocks, FOLDS, Fit};
 use super::instants::instant_std;
 use super::lack_of_fit::Misfit;
 use super::options::DiagnosisOptions;
-use super::ruling::{Claim, Grounds, Ruling, high_band_variance, repeats};
+use super::ruling::Ruling;
 use super::selection::{Choice, Chosen, Judged};
 use super::unnamed_law::UnnamedLaw;
 use super::validation::{free_run_rms, held_out, pooled_rms};
 use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
-use crate::spectra::period_samples;
 
 /// What an answer is made from.
 pub(super) struct Findings<'a> {
@@ -73,7 +72,7 @@ impl Findings<'_> {
         self.bench.output_scale.first().copied().unwrap_or(1.0)
     }
 
-    fn systematic(&self) -> bool {
+    pub(super) fn systematic(&self) -> bool {
         self.misfit.is_systematic(self.options.tolerated_misfit) || self.lacking().is_some()
     }
 
@@ -91,93 +90,7 @@ impl Findings<'_> {
         self.unnamed.as_ref().filter(|law| law.gain > least || law.beats(self.bench, last))
     }
 
-    /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
-    fn grounds(&self, named: &[NamedCause], errors: &[Option<f64>]) -> Grounds {
-        let square = |rms: Option<f64>| rms.map(|rms| rms * rms);
-        let of = |cause: &NamedCause| Claim {
-            id: cause.id.clone(),
-            held_out: square(cause.gain.rms_before).zip(square(cause.gain.rms_after)).map(|(a, b)| [a, b]),
-        };
-        let ends = errors.first().copied().flatten().zip(errors.last().copied().flatten());
-        Grounds {
-            adequate: self.adequate,
-            systematic: self.systematic(),
-            claims: named.iter().map(of).collect(),
-            unnamed: !self.choice.chosen.is_empty(),
-            training: square(self.choice.ladder.last().and_then(|last| self.rms(last.fit.loss))),
-            held_out: ends.map(|(before, after)| [before * before, after * after]),
-            noise: self.noise(),
-            against_clean: self.repeated().into_iter().collect(),
-            against_all: self.endless().into_iter().collect(),
-        }
-    }
-
-    /// Mean square on what names have to gain on of the last model without the named causes that do not stand, refitted.
-    fn alone(&self, stand: &[usize]) -> Option<f64> {
-        let named: Vec<usize> = self.choice.chosen.iter().filter(|own| own.has_a_name()).map(|own| own.place).collect();
-        let mut gone: Vec<usize> =
-            named.iter().enumerate().filter(|(number, _)| !stand.contains(number)).map(|(_, place)| *place).collect();
-        gone.sort_unstable();
-        let last = &self.choice.ladder.last()?.fit.model;
-        let model = gone.into_iter().rev().fold(last.clone(), |model, which| model.without(which));
-        let judged = Judged::new(Fit::new(self.bench, &model, Until::JUDGED)?, self.bench, &self.blocks);
-        let rms = match held_out(&self.options.parts) {
-            [] => self.rms(judged.unseen()),
-            parts => pooled_rms(self.bench, self.records, &judged.fit.model, parts),
-        };
-        rms.map(|rms| rms * rms)
-    }
-
-    /// Variance of the noise in the output's unit, from where the system does not respond.
-    fn noise(&self) -> Option<f64> {
-        let (last, layout) = (&self.choice.ladder.last()?.fit, &self.bench.layout);
-        let mut sum = 0.0;
-        for e in 0..layout.stretches() {
-            for channel in 0..layout.channels {
-                let part = layout.part(e, channel, 0, layout.samples(e));
-                let there = self.bench.output[part.clone()].iter().zip(&last.residual[part]);
-                let values: Vec<f64> = there.map(|(y, left)| if y.is_finite() { *left } else { f64::NAN }).collect();
-                sum += high_band_variance(&values)? * values.iter().filter(|value| value.is_finite()).count() as f64;
-            }
-        }
-        self.rms(sum).map(|rms| rms * rms)
-    }
-
-    /// What is left that repeats itself with the input, in a sentence; none where that may be noise.
-    fn repeated(&self) -> Option<String> {
-        let (stretch, last) = (self.bench.stretches.first()?, &self.choice.ladder.last()?.fit);
-        let input = self.records.get(stretch.record)?.input.get(stretch.first..stretch.end)?;
-        let period = period_samples(&[input])?;
-        let ratio = repeats(last.residual.get(self.bench.layout.part(0, 0, 0, input.len()))?, period)?;
-        (ratio > REPEATS).then(|| {
-            format!(
-                "what is left repeats itself every {period} samples, with the input: {ratio:.1} times the power that noise \
-                 leaves of it"
-            )
-        })
-    }
-
-    /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.
-    fn endless(&self) -> Option<String> {
-        let (first, layout) = (self.choice.ladder.first()?, &self.bench.layout);
-        let longest = (0..layout.stretches()).map(|e| layout.samples(e)).max()?;
-        let lasts_s = longest as f64 * self.bench.interval_s;
-        let goes_on = |section: &&super::dynamics::Section| {
-            section.kind == Kind::Oscillator && 0.5 * section.omega() * section.loss * lasts_s < ENDLESS
-        };
-        // beside other modes it was looked at when they were found
-        let [section] = &first.fit.model.dynamics.sections[..] else { return None };
-        if !self.bench.driven || !goes_on(&section) {
-            return None;
-        }
-        Some(format!(
-            "the linear model's oscillation at {:.4} Hz does not die away in the record: it stands for something else, an \
-             integrator or a line",
-            section.frequency_hz
-        ))
-    }
-
-    fn rms(&self, loss: f64) -> Option<f64> {
+    pub(super) fn rms(&self, loss: f64) -> Option<f64> {
         finite((loss / self.bench.count as f64).sqrt() * self.scale())
     }
 
@@ -420,12 +333,6 @@ impl Findings<'_> {
         lines
     }
 }
-
-/// Power that repeats itself over that of noise, from which on it is more than a model of that noise may leave: as much
-/// again.
-const REPEATS: f64 = 2.0;
-/// Nepers over the longest stretch below which nothing is known of a damping: of an error of a thousandth a share.
-const ENDLESS: f64 = 1e-3;
 
 /// Samples of a part that are scored.
 fn scored(part: &Part) -> usize {

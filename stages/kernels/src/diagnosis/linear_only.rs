@@ -7,7 +7,7 @@ use super::data::{LEAST_SAMPLES, Layout, Stretch};
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Moments};
 use super::lack_of_fit::{Misfit, RIDGE};
-use super::ruling::{Grounds, Ruling, high_band_variance, repeats};
+use super::ruling::{Grounds, Ruling, high_band_variance, left_beyond_noise, left_repeating, repeats};
 use super::verdict::{BaselineSummary, Diagnosis, Validation, Verdict};
 use crate::Monitor;
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
@@ -46,11 +46,6 @@ const BLOCKS: usize = 48;
 /// which the baselines of causes count as none.
 const FOLLOWS: f64 = 10.0;
 
-/// Share of the output's variance that may be left beyond noise of a model that is the whole story.
-const BEYOND: f64 = 0.02;
-/// Power that repeats itself with the inputs over that of noise, from which on it is more than a model may leave.
-const REPEATS: f64 = 2.0;
-
 impl LinearOnly {
     /// Whether it describes what was measured: the output follows from the inputs, no product of them predicts more
     /// than is tolerated, and what was held out agrees.
@@ -59,19 +54,8 @@ impl LinearOnly {
     }
 
     fn ruling(&self, tolerated: f64) -> Ruling {
-        let mut against = Vec::new();
-        if let Some(share) = self.beyond_noise.filter(|share| *share > BEYOND) {
-            against.push(format!(
-                "the error there beyond the noise of its high band is {:.1} % of the output's variance: a linear model \
-                 does not account for it",
-                100.0 * share
-            ));
-        }
-        if let Some(ratio) = self.repeats.filter(|ratio| *ratio > REPEATS) {
-            against.push(format!(
-                "the error there repeats itself with the inputs: {ratio:.1} times the power that noise leaves of it"
-            ));
-        }
+        let beyond = self.beyond_noise.and_then(left_beyond_noise);
+        let against = beyond.into_iter().chain(self.repeats.and_then(left_repeating)).collect();
         let grounds = Grounds {
             adequate: self.fit_percent > FOLLOWS,
             systematic: self.misfit.is_systematic(tolerated),

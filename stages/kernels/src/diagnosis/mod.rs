@@ -26,6 +26,7 @@ mod dynamics;
 mod error;
 mod fit;
 mod general_laws;
+mod grounds;
 #[cfg(test)]
 mod hidden_paths;
 mod instants;

@@ -13,6 +13,29 @@ const BESIDE: f64 = 0.05;
 /// less: a part to judge on begins in a state that few samples tell.
 const AGREES: f64 = 4.0;
 
+/// Share of the output's variance that may be left beyond noise of a linear model that is the whole story.
+const BEYOND: f64 = 0.02;
+/// Power that repeats itself with the input over that of noise, from which on it is more than a model may leave.
+const REPEATS: f64 = 2.0;
+
+/// What speaks against a linear model that leaves this share of the output's variance beyond noise; none if it may.
+pub fn left_beyond_noise(share: f64) -> Option<String> {
+    (share > BEYOND).then(|| {
+        format!(
+            "what is left beyond the noise of its high band is {:.1} % of the output's variance: a linear model does not \
+             account for it",
+            100.0 * share
+        )
+    })
+}
+
+/// The same where what is left repeats itself with the input, at so many times the power that noise leaves of it.
+pub fn left_repeating(ratio: f64) -> Option<String> {
+    (ratio > REPEATS).then(|| {
+        format!("what is left repeats itself with the input: {ratio:.1} times the power that noise leaves of it")
+    })
+}
+
 /// A cause before it is named.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {
@@ -227,6 +250,13 @@ mod tests {
         for grounds in wrong {
             assert_eq!(grounds.ruling(&|_| None).verdict, Verdict::Unexplained, "{grounds:?}");
         }
+    }
+
+    #[test]
+    fn what_is_left_beyond_noise_or_repeats_itself_is_said_with_its_size() {
+        assert_eq!((left_beyond_noise(0.019), left_beyond_noise(f64::NAN), left_repeating(1.9)), (None, None, None));
+        assert!(left_beyond_noise(0.26).is_some_and(|said| said.contains("26.0 % of the output's variance")));
+        assert!(left_repeating(28.0).is_some_and(|said| said.contains("28.0 times")));
     }
 
     #[test]

@@ -107,7 +107,7 @@ pub(super) fn follow_laws(
         rows.widen(course.mode, 0.5 * (course.last.pole() - course.first.pole()));
     }
     // of a line that is several modes none lies within another's range by mistake
-    let several = found.fit.lines.iter().any(|line| matches!(line.follows, Follows::Beside | Follows::Exponentials(_)));
+    let several = found.fit.lines.iter().any(is_several);
     for (mode, range) in rows.ranges() {
         rows.drop_multiples(mode, range);
         if !several {
@@ -242,7 +242,8 @@ impl<'a> LawFit<'a> {
             let events: Vec<Vec<&[f64]>> = self.events.iter().map(part).collect();
             let mut found = Lines::of(&LawFit { events: &events, ..*self }, &line.own, &[]).ok()?;
             let one = if found.fit.lines.len() == 1 { found.fit.lines.pop() } else { None }?;
-            let holds = one.follows == Follows::Moving && law(&one).is_some();
+            let is_one = one.follows == Follows::Moving || one.follows == Follows::Beside && !is_several(&one);
+            let holds = is_one && law(&one).is_some();
             holds.then(|| FirstPart { line: widened(one), share })
         })
     }
@@ -280,7 +281,7 @@ impl<'a> LawFit<'a> {
         let tag = if has_row.is_empty() { rows.restored(strongest) } else { rows.strongest(&has_row) };
         rows.drop_but(own, tag);
         rows.take_laws(tag, mode, line.lack.factor);
-        let beside = line.modes.get(1).filter(|other| line.follows == Follows::Beside && rings(other));
+        let beside = beside(line);
         if let Some(other) = beside {
             let second = rows.restored(strongest);
             rows.take_linear(second, other, line.lack.factor);
@@ -364,6 +365,16 @@ fn law(line: &FollowedLine) -> Option<&FollowedMode> {
         _ => false,
     };
     (stands && dies(mode)).then_some(mode)
+}
+
+/// What rings beside the mode of a line; a steady line does not.
+fn beside(line: &FollowedLine) -> Option<&FollowedMode> {
+    line.modes.get(1).filter(|other| line.follows == Follows::Beside && rings(other))
+}
+
+/// Whether a line is several modes: a plateau under one is none.
+fn is_several(line: &FollowedLine) -> bool {
+    matches!(line.follows, Follows::Exponentials(_)) || beside(line).is_some()
 }
 
 /// Whether a mode's damping is above zero somewhere along its amplitude.

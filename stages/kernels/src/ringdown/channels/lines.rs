@@ -42,7 +42,7 @@ impl Lines {
         let first = left.fitted(given.iter().map(single).collect(), left.noise_variance.clone());
         let line_holds = |line: &FollowedLine| match line.follows {
             Follows::None => line.lack.factor < LARGEST_LACK,
-            Follows::Moving => line.modes.iter().any(dies),
+            Follows::Moving | Follows::Beside => line.modes.iter().any(dies),
             _ => true,
         };
         let holds = |found: &Self| found.fit.lines.iter().all(line_holds);

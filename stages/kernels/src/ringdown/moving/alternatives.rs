@@ -1,12 +1,12 @@
 //! What else a line may be: several linear modes, a mode beside a linear one, a multiple of another mode's phase.
 
 use crate::ringdown::moving::exponentials::{Pole, exponentials, solved};
-use crate::ringdown::moving::follow::{BUDGET, LEAST_DECAY, Line, Options};
+use crate::ringdown::moving::follow::{BUDGET, Exponential, LEAST_DECAY, Line, Options};
 use crate::ringdown::moving::lack::{Lack, lack};
 use crate::ringdown::moving::layout::range;
 use crate::ringdown::moving::model::{MOST_DAMPING, MULTIPLES, Mode};
 use crate::ringdown::moving::result::Follows;
-use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit};
+use crate::ringdown::moving::search::{Fit, Problem, TRIALS, Weighted, fit, fit_within};
 use crate::ringdown::moving::select::{Rules, projected, selected};
 use crate::ringdown::moving::terms::{Law, TERMS, Term, values};
 use faer::c64;
@@ -30,10 +30,13 @@ const AS_GOOD: f64 = 6.0;
 const DECISIVE: f64 = 10.0;
 /// Gain of BIC from which on a linear mode stands beside one that moves.
 const BESIDE_GAIN: f64 = 60.0;
-/// Where steady lines beside a mode are begun, in its half widths.
-const LINES_ABOUT: [f64; 6] = [-4.0, -2.0, -0.7, 0.7, 2.0, 4.0];
+/// Where steady lines beside a mode are begun, on either side, in its half widths, and trials of each.
+const LINES_ABOUT: [f64; 6] = [0.6, 1.5, 2.5, 4.0, 6.0, 8.0];
+const LINE_TRIALS: usize = 20;
 /// Mean square of what is left in a line's band, in units of noise, from which on it may beat.
 const BEATS: f64 = 3.0;
+/// Share of a pass's work that steady lines about a mode have at least: what was tried before them may have taken all.
+const FOR_LINES: f64 = 0.3;
 /// Trials of a sum of exponentials, and how far above a mode that leaves no more than noise it may be for more of them.
 const EXPONENTIALS: (usize, f64) = (12, 300.0);
 
@@ -67,7 +70,7 @@ impl OfLine {
 impl Search<'_> {
     pub(crate) fn bic(&self, fit: &Fit) -> f64 {
         let rows: usize = self.problem.data.records.iter().map(|r| r.rows).sum();
-        let terms: usize = fit.modes.iter().map(|m| m.damping.terms.len() + m.frequency.terms.len() - 2).sum();
+        let terms: usize = fit.modes.iter().map(|m| m.damping.terms_that_move() + m.frequency.terms_that_move()).sum();
         // one of so many terms: each has its share of the prior
         let choice = 2.0 * (2.0 * (TERMS - 1) as f64).ln() * terms as f64;
         fit.normal.chi_square + fit.parameters() as f64 * (rows.max(2) as f64).ln() + choice
@@ -173,18 +176,26 @@ impl Search<'_> {
             // laws of no one cause may stand for a line beside
             let odd = mode.moves() && !is_of_one_cause(mode) && rate_at_half(mode) < MOST_DAMPING * mode.turn;
             let unexplained = left.p_value < UNEXPLAINED;
-            let beside = if unexplained || odd { self.beside(&best, line, number, odd) } else { None };
+            let beside = if unexplained || odd { self.beside(&best, line, number) } else { None };
+            let plateau = if odd { self.plateau(&best, number) } else { None };
             of_lines[line].bic_difference = other.as_ref().map(|other| own - self.bic(other));
             // as good is not enough where one mode is the plainer account, and enough where it is not
-            let wanted = own - if plain { DECISIVE } else { -DECISIVE * f64::from(u8::from(!lacks)) };
+            let as_good = DECISIVE * f64::from(u8::from(!lacks));
+            let wanted = own + if plain { -DECISIVE } else { as_good };
             let good = |fit: &Fit| self.bic(fit) < wanted;
             let gain = if unexplained { BESIDE_GAIN } else { DECISIVE };
             let beside = beside.filter(|fit| self.bic(fit) < own - gain);
+            // more than noise left: no better account than any other line beside
+            let explains = |fit: &Fit| self.lack(fit, number).factor <= 1.0;
+            // a pull by one over the amplitude is what play makes of one mode
+            let as_good = if is_of_play(&best.modes[number]) { -DECISIVE } else { as_good };
+            let plateau =
+                plateau.filter(|fit| self.bic(fit) < own + as_good && (explains(fit) || self.bic(fit) < own - gain));
             let other = other.filter(good);
-            let sum_is_better = match (&other, &beside) {
-                (Some(a), Some(b)) => self.bic(a) <= self.bic(b) + DECISIVE,
-                (one, _) => one.is_some(),
-            };
+            let above = |one: &Option<Fit>, by: f64| one.as_ref().map_or(f64::INFINITY, |fit| self.bic(fit) + by);
+            let lowest = above(&beside, DECISIVE).min(above(&plateau, 0.0));
+            let sum_is_better = other.as_ref().is_some_and(|fit| self.bic(fit) <= lowest);
+            let beside = if above(&plateau, 0.0) < above(&beside, DECISIVE) { plateau } else { beside };
             if let (Some(other), true) = (&other, sum_is_better) {
                 take(of_lines, line, number, best.modes.len() - 1, other.modes.len());
                 best = other.clone();
@@ -197,38 +208,61 @@ impl Search<'_> {
         best
     }
 
-    /// The mode with a linear one in its line: steady, or with a pole of the linear fit. Where a steady line stands beside
-    /// a mode of one cause, the laws that stood for both are no start: plain ones are, with steady lines about the mode.
-    fn beside(&self, best: &Fit, line: usize, number: usize, odd: bool) -> Option<Fit> {
+    /// The mode with a linear one in its line: steady (a plateau, whose amplitude does not change), or with a pole of the
+    /// linear fit, which decays.
+    fn beside(&self, best: &Fit, line: usize, number: usize) -> Option<Fit> {
         let mode = &best.modes[number];
         let longest = self.problem.data.hits.iter().map(|hit| hit.duration_s).fold(0.0, f64::max);
         let low = mode.frequency.at(&values(0.05 * range(mode).1, mode.floor).value);
-        let given = self.lines[line].poles.iter().map(|p| (p.rate_per_s.max(0.0), p.turn_rad_per_s - mode.turn));
-        let with = |best: &Fit, pole: Pole| {
-            if self.problem.is_spent() {
-                return None;
-            }
-            let mode = &best.modes[number];
-            let unit = Mode {
-                damping: Law::constant(pole.0.max(LEAST_DECAY / longest)),
-                frequency: Law::constant(pole.1),
-                harmonics: [None, None],
-                may_move: false,
-                ..mode.clone()
-            };
-            let more = solved(self.problem.data, &best.modes, vec![unit])?;
-            let begin = fit(&self.problem, best.modes.iter().cloned().chain(more).collect())?;
-            Some(selected(&self.problem, begin, &self.rules, 3))
+        let decaying =
+            |p: &Exponential| (Law::constant(p.rate_per_s.max(LEAST_DECAY / longest)), p.turn_rad_per_s - mode.turn);
+        let given = self.lines[line].poles.iter().map(decaying);
+        let with = |(damping, offset): (Law, f64)| {
+            let begin = self.with_line(best, number, damping, offset, TRIALS)?;
+            let found = selected(&self.problem, begin, &self.rules, 3);
+            // what grows is no mode
+            let grows = found.modes.last().is_some_and(|m| m.damping.coefficients.iter().any(|rate| *rate < 0.0));
+            (!grows).then_some(found)
         };
-        let starts = std::iter::once((0.0, low)).chain(given);
-        let from_laws = starts.take(3).filter_map(|pole| with(best, pole));
-        let plain = if odd { self.plainly(best, number) } else { None };
+        let starts = std::iter::once((Law::zero(), low)).chain(given);
+        starts.take(3).filter_map(with).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
+    }
+
+    /// A mode of one cause with a steady line beside, in the place of laws of none: those stood for both and are no start.
+    /// Plain laws are, with lines all about the mode.
+    fn plateau(&self, best: &Fit, number: usize) -> Option<Fit> {
+        // what was tried before may have taken all
+        self.problem.budget.set(self.problem.budget.get().max(FOR_LINES * BUDGET));
+        let mode = &best.modes[number];
+        let longest = self.problem.data.hits.iter().map(|hit| hit.duration_s).fold(0.0, f64::max);
         let rate = rate_at_half(mode).max(LEAST_DECAY / longest);
-        let from_plain = plain.iter().flat_map(|plain| {
-            let centre = plain.modes[number].frequency.at(&values(0.5 * range(mode).1, mode.floor).value);
-            LINES_ABOUT.map(|widths| with(plain, (0.0, centre + widths * rate)))
-        });
-        from_laws.chain(from_plain.flatten()).min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))
+        let plain = self.plainly(best, number)?;
+        let centre = plain.modes[number].frequency.at(&values(0.5 * range(mode).1, mode.floor).value);
+        let about = LINES_ABOUT.iter().flat_map(|widths| [-widths, *widths]);
+        let begun = about
+            .filter_map(|widths| self.with_line(&plain, number, Law::zero(), centre + widths * rate, LINE_TRIALS))
+            .min_by(|a, b| self.bic(a).total_cmp(&self.bic(b)))?;
+        let found = fit(&self.problem, begun.modes)?;
+        // terms that do not show stay: without them errors would leave out what a short record cannot tell
+        let other = selected(&self.problem, found.clone(), &self.rules, 1);
+        let is_better = other.parameters() > found.parameters() && self.bic(&other) + AS_GOOD < self.bic(&found);
+        Some(if is_better { other } else { found })
+    }
+
+    /// The fit with a linear mode more, of a damping and at so much from the carrier of a mode whose line it shares.
+    fn with_line(&self, best: &Fit, number: usize, damping: Law, offset: f64, trials: usize) -> Option<Fit> {
+        if self.problem.is_spent() {
+            return None;
+        }
+        let unit = Mode {
+            damping,
+            frequency: Law::constant(offset),
+            harmonics: [None, None],
+            may_move: false,
+            ..best.modes[number].clone()
+        };
+        let more = solved(self.problem.data, &best.modes, vec![unit])?;
+        fit_within(&self.problem, best.modes.iter().cloned().chain(more).collect(), trials)
     }
 
     /// The fit with the plainest laws that move in one mode: drag and a cubic spring.
@@ -351,6 +385,11 @@ fn is_of_one_cause(mode: &Mode) -> bool {
     damping.len() <= 1
         && damping.iter().all(|term| OF_DAMPING.contains(term))
         && (frequency.is_empty() || OF_FREQUENCY.iter().any(|terms| frequency.iter().all(|term| terms.contains(term))))
+}
+
+/// Whether the frequency is pulled by one over the amplitude: by play.
+fn is_of_play(mode: &Mode) -> bool {
+    mode.frequency.terms == [Term::One, Term::Inverse]
 }
 
 /// Replaces a line's mode by exponentials, which are the last modes of the fit.

@@ -73,6 +73,16 @@ impl Law {
         Self { terms: vec![Term::One], coefficients: vec![value] }
     }
 
+    /// No term: zero, and nothing to be fitted.
+    pub fn zero() -> Self {
+        Self::default()
+    }
+
+    /// How many terms beside the constant.
+    pub fn terms_that_move(&self) -> usize {
+        self.terms.iter().filter(|&&t| t != Term::One).count()
+    }
+
     /// Its value where the terms have these.
     pub fn at(&self, terms: &[f64; TERMS]) -> f64 {
         self.terms.iter().zip(&self.coefficients).map(|(t, c)| c * terms[t.index()]).sum()
@@ -80,7 +90,7 @@ impl Law {
 
     /// Whether it depends on the amplitude.
     pub fn moves(&self) -> bool {
-        self.terms.iter().any(|&t| t != Term::One)
+        self.terms_that_move() > 0
     }
 
     /// With one term more, coefficient zero.

@@ -1,0 +1,113 @@
+//! What the models of an input and an output, or of decays, have to say for a verdict.
+
+use super::answer::Findings;
+use super::dynamics::{Kind, Section};
+use super::fit::{Fit, Until};
+use super::ruling::{Claim, Grounds, high_band_variance, left_beyond_noise, left_repeating, repeats};
+use super::selection::Judged;
+use super::validation::{held_out, pooled_rms};
+use super::verdict::NamedCause;
+use crate::spectra::period_samples;
+
+/// Nepers over the longest stretch below which nothing is known of a damping: of an error of a thousandth a share.
+const ENDLESS: f64 = 1e-3;
+
+impl Findings<'_> {
+    /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
+    pub(super) fn grounds(&self, named: &[NamedCause], errors: &[Option<f64>]) -> Grounds {
+        let square = |rms: Option<f64>| rms.map(|rms| rms * rms);
+        let of = |cause: &NamedCause| Claim {
+            id: cause.id.clone(),
+            held_out: square(cause.gain.rms_before).zip(square(cause.gain.rms_after)).map(|(a, b)| [a, b]),
+        };
+        let ends = errors.first().copied().flatten().zip(errors.last().copied().flatten());
+        let noise = self.noise();
+        Grounds {
+            adequate: self.adequate,
+            systematic: self.systematic(),
+            claims: named.iter().map(of).collect(),
+            unnamed: !self.choice.chosen.is_empty(),
+            training: square(self.choice.ladder.last().and_then(|last| self.rms(last.fit.loss))),
+            held_out: ends.map(|(before, after)| [before * before, after * after]),
+            noise,
+            against_clean: self.repeated().into_iter().chain(self.beyond_noise(noise)).collect(),
+            against_all: self.endless().into_iter().collect(),
+        }
+    }
+
+    /// Mean square on what names have to gain on of the last model without the named causes that do not stand, refitted.
+    pub(super) fn alone(&self, stand: &[usize]) -> Option<f64> {
+        let named: Vec<usize> = self.choice.chosen.iter().filter(|own| own.has_a_name()).map(|own| own.place).collect();
+        let mut gone: Vec<usize> =
+            named.iter().enumerate().filter(|(number, _)| !stand.contains(number)).map(|(_, place)| *place).collect();
+        gone.sort_unstable();
+        let last = &self.choice.ladder.last()?.fit.model;
+        let model = gone.into_iter().rev().fold(last.clone(), |model, which| model.without(which));
+        let judged = Judged::new(Fit::new(self.bench, &model, Until::JUDGED)?, self.bench, &self.blocks);
+        let rms = match held_out(&self.options.parts) {
+            [] => self.rms(judged.unseen()),
+            parts => pooled_rms(self.bench, self.records, &judged.fit.model, parts),
+        };
+        rms.map(|rms| rms * rms)
+    }
+
+    /// Variance of the noise in the output's unit, from where the system does not respond.
+    fn noise(&self) -> Option<f64> {
+        let (last, layout) = (&self.choice.ladder.last()?.fit, &self.bench.layout);
+        let mut sum = 0.0;
+        for e in 0..layout.stretches() {
+            for channel in 0..layout.channels {
+                let part = layout.part(e, channel, 0, layout.samples(e));
+                let there = self.bench.output[part.clone()].iter().zip(&last.residual[part]);
+                let values: Vec<f64> = there.map(|(y, left)| if y.is_finite() { *left } else { f64::NAN }).collect();
+                sum += high_band_variance(&values)? * values.iter().filter(|value| value.is_finite()).count() as f64;
+            }
+        }
+        self.rms(sum).map(|rms| rms * rms)
+    }
+
+    /// What is left that repeats itself with the input, in a sentence; none where that may be noise.
+    fn repeated(&self) -> Option<String> {
+        let (stretch, last) = (self.bench.stretches.first()?, &self.choice.ladder.last()?.fit);
+        let input = self.records.get(stretch.record)?.input.get(stretch.first..stretch.end)?;
+        let period = period_samples(&[input])?;
+        left_repeating(repeats(last.residual.get(self.bench.layout.part(0, 0, 0, input.len()))?, period)?)
+    }
+
+    /// What is left of a driven output beyond noise, where that is more than a linear model may leave, in a sentence.
+    fn beyond_noise(&self, noise: Option<f64>) -> Option<String> {
+        let (last, layout) = (self.choice.ladder.last()?, &self.bench.layout);
+        let parts = (0..layout.stretches())
+            .flat_map(|e| (0..layout.channels).map(move |channel| layout.part(e, channel, 0, layout.samples(e))));
+        let variance: f64 = parts.map(|part| about_mean(&self.bench.output[part])).sum();
+        let left = self.rms(last.fit.loss)?.powi(2) - noise?;
+        self.bench.driven.then(|| left_beyond_noise(left / self.rms(variance)?.powi(2))).flatten()
+    }
+
+    /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.
+    fn endless(&self) -> Option<String> {
+        let (first, layout) = (self.choice.ladder.first()?, &self.bench.layout);
+        let longest = (0..layout.stretches()).map(|e| layout.samples(e)).max()?;
+        let lasts_s = longest as f64 * self.bench.interval_s;
+        let goes_on = |section: &&Section| {
+            section.kind == Kind::Oscillator && 0.5 * section.omega() * section.loss * lasts_s < ENDLESS
+        };
+        // beside other modes it was looked at when they were found
+        let [section] = &first.fit.model.dynamics.sections[..] else { return None };
+        if !self.bench.driven || !goes_on(&section) {
+            return None;
+        }
+        Some(format!(
+            "the linear model's oscillation at {:.4} Hz does not die away in the record: it stands for something else, an \
+             integrator or a line",
+            section.frequency_hz
+        ))
+    }
+}
+
+/// Sum of the squares of values about their mean; those that are missing are left out.
+fn about_mean(values: &[f64]) -> f64 {
+    let there: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let mean = there.iter().sum::<f64>() / there.len().max(1) as f64;
+    there.iter().map(|value| (value - mean).powi(2)).sum()
+}
