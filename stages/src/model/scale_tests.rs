@@ -133,15 +133,15 @@ fn by_ringdown(ensemble: &Array) -> Found {
 #[test]
 fn the_error_of_the_rate_goes_into_that_of_frequencies_and_into_nothing_else() {
     let record = pair(record(4096, 0));
-    let by: [(&str, fn(&Array) -> Found, Array); 5] = [
-        ("pem", by_pem, record.clone()),
-        ("subspace", by_subspace, record.clone()),
-        ("grey", by_grey, record.clone()),
-        ("responses", by_responses, record),
-        ("ringdown", by_ringdown, crate::ensemble::example::ensemble()),
+    let methods: [(Method, Array); 5] = [
+        (("pem", by_pem), record.clone()),
+        (("subspace", by_subspace), record.clone()),
+        (("grey", by_grey), record.clone()),
+        (("responses", by_responses), record),
+        (("ringdown", by_ringdown), crate::ensemble::example::ensemble()),
     ];
     let relative_std = 1e-2;
-    for (name, by, known) in by {
+    for ((name, by), known) in methods {
         let [f, std, quality, quality_std] = by(&known);
         let wider = by(&RateError { relative_std }.stated_by(known));
         // two numbers added in squares: rounding
