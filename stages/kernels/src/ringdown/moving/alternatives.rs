@@ -30,8 +30,9 @@ const AS_GOOD: f64 = 6.0;
 const DECISIVE: f64 = 10.0;
 /// Gain of BIC from which on a linear mode stands beside one that moves.
 const BESIDE_GAIN: f64 = 60.0;
-/// Where steady lines beside a mode are begun, on either side, in its half widths, and trials of each.
+/// Where steady lines beside a mode are begun, on either side, in its half widths.
 const LINES_ABOUT: [f64; 6] = [0.6, 1.5, 2.5, 4.0, 6.0, 8.0];
+/// Trials of each: enough to tell which arrives; the best is fitted to its end.
 const LINE_TRIALS: usize = 20;
 /// Mean square of what is left in a line's band, in units of noise, from which on it may beat.
 const BEATS: f64 = 3.0;

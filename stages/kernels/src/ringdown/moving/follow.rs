@@ -55,8 +55,8 @@ impl Default for Options {
 
 /// Least decay within the longest hit that a start has: what seems steady in a linear fit may be a mode that moves.
 pub(crate) const LEAST_DECAY: f64 = 0.3;
-/// Multiplications that trials of models may take in all: about half a second, and a third more for each line that may stand
-/// over a plateau. Fits under way are ended soon after.
+/// Multiplications that trials of models may take in all: about half a second, and a third more for each line that may
+/// stand over a plateau. Fits under way are ended soon after.
 pub(crate) const BUDGET: f64 = 5e8;
 /// Passes with finer blocks, at most, and the share of a block's length at which one is made.
 const ROUNDS: usize = 3;
