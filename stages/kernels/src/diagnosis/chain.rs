@@ -36,12 +36,15 @@ pub(super) struct Chain {
 ///
 /// # Method
 /// [`fit_block_oriented`] with every structure that may be named. It is judged on the first part, or on the last quarter
-/// of the stretch, which then takes no share in the fit.
+/// of the stretch, which then takes no share in the fit. There its error is below that of the linear model by [`SHARE`] and
+/// below that of the extended model: where causes describe the data as well, no curve is named beside them.
+///
+/// `simulated`: by the linear and by the extended model, of the stretch, in the output's unit.
 pub(super) fn chain(
     bench: &Bench,
     records: &[Record<'_>],
     options: &DiagnosisOptions,
-    linear: &[f64],
+    [linear, extended]: [&[f64]; 2],
     diagnosis: &mut Diagnosis,
 ) -> Option<Chain> {
     let (stretch, record) = (*bench.stretches.first()?, records.first()?);
@@ -70,10 +73,14 @@ pub(super) fn chain(
     let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
     let end = options.parts.iter().map(|part| part.stretch.end).fold(judged.end.max(stretch.end), usize::max);
     let simulated = fit.model.simulate(record.input.get(..end)?);
-    // the linear model's error there: its simulation where it was learnt from, its rms elsewhere
-    let before = match held_out {
-        Some(part) => diagnosis.validation.iter().find(|v| v.name == part.name)?.rms_before?,
-        None => rms(output, linear, stretch.first, &judged)?,
+    // the other models' errors there: of their simulation where it was learnt from, their rms elsewhere
+    let (before, causes) = match held_out {
+        Some(part) => {
+            let validation = diagnosis.validation.iter().find(|v| v.name == part.name)?;
+            let before = validation.rms_before?;
+            (before, validation.rms_after.unwrap_or(before))
+        }
+        None => (rms(output, linear, stretch.first, &judged)?, rms(output, extended, stretch.first, &judged)?),
     };
     let after = rms(output, &simulated, 0, &judged)?;
     let bend = fit.curve_strength();
@@ -85,6 +92,15 @@ pub(super) fn chain(
             "linear parts and a static curve ({}) account for {share:.0} % of the squared error of the linear model on \
              what did not choose them: not enough to be named",
             id(fit.structure)
+        ));
+        return None;
+    }
+    if !significant(output, &simulated, causes, &judged) {
+        diagnosis.evidence.push(format!(
+            "linear parts and a static curve ({}) miss {:.3} times what the model with causes misses on what did not choose \
+             them: no curve is named",
+            id(fit.structure),
+            after / causes
         ));
         return None;
     }

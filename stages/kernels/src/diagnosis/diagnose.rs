@@ -146,7 +146,7 @@ pub fn diagnose(
     let named = if diagnosis.verdict == Verdict::Named { &extended } else { &linear };
     let scales = (&bench.output_scale[..], bench.input_scale);
     let mut simulation = Simulation::Modal(ModalSimulation::new(named, scales, bench.reference_s(), bench.steps()));
-    if let Some(chain) = chain(&bench, records, options, &before, &mut diagnosis) {
+    if let Some(chain) = chain(&bench, records, options, [&before, &after], &mut diagnosis) {
         after = chain.after;
         simulation = Simulation::Chain { model: chain.model, interval_s };
         story = Story::of_series(&output, [&before, &after], interval_s, &[]).over_parts(

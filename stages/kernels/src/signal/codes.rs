@@ -3,7 +3,7 @@
 /// Smallest step between values of a channel: one code of its converter; 0 where values are not codes.
 pub fn code_step(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
+    sorted.sort_unstable_by(f64::total_cmp);
     let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else { return 0.0 };
     let range = last - first;
     sorted.dedup();

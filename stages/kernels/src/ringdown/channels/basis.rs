@@ -88,19 +88,48 @@ pub(super) fn signal(poles: &Poles, own: &[f64], interval_s: f64, samples: usize
     let centre = 0.5 * (samples.max(2) - 1) as f64;
     let slope = if drift { own[2 * modes + 1] } else { 0.0 };
     let mut out: Vec<f64> = (0..samples).map(|k| own[2 * modes] + slope * (k as f64 - centre) / centre).collect();
-    let step = |pole: &c64| (pole * interval_s).exp();
-    let mut turning: Vec<(c64, c64)> =
-        poles.0.iter().zip(own.chunks_exact(2)).map(|(pole, z)| (c64::new(z[0], z[1]), step(pole))).collect();
-    for value in &mut out {
-        // side by side: each waits for its own last product alone
-        for (z, step) in &mut turning {
-            *value += z.re;
-            *z *= *step;
-            // below every rounding nothing is left to add, and denormal numbers are slow
-            if z.norm_sqr() < 1e-200 {
-                *z = c64::new(0.0, 0.0);
-            }
-        }
+    for (pole, residue) in poles.0.iter().zip(own.chunks_exact(2)) {
+        Turning::of(pole * interval_s, c64::new(residue[0], residue[1])).added(&mut out);
     }
     out
+}
+
+/// Samples side by side, for the processor's vector units.
+const LANES: usize = 8;
+
+/// An exponential's next samples.
+struct Turning {
+    re: [f64; LANES],
+    im: [f64; LANES],
+    /// Factor over so many samples.
+    step: c64,
+}
+
+impl Turning {
+    /// `s`: the exponential's change over a sample, natural logarithm.
+    fn of(s: c64, residue: c64) -> Self {
+        let first: [c64; LANES] = std::array::from_fn(|lane| residue * (s * lane as f64).exp());
+        Self { re: first.map(|z| z.re), im: first.map(|z| z.im), step: (s * LANES as f64).exp() }
+    }
+
+    /// Adds the real part to each sample.
+    fn added(mut self, out: &mut [f64]) {
+        let step = self.step;
+        let (whole, rest) = out.as_chunks_mut::<LANES>();
+        for part in whole {
+            let mut largest = 0.0f64;
+            for lane in 0..LANES {
+                let (re, im) = (self.re[lane], self.im[lane]);
+                part[lane] += re;
+                self.re[lane] = re * step.re - im * step.im;
+                self.im[lane] = re * step.im + im * step.re;
+                largest = largest.max(re.abs() + im.abs());
+            }
+            // below every rounding nothing is left to add, and denormal numbers are slow
+            if largest < 1e-100 {
+                return;
+            }
+        }
+        rest.iter_mut().zip(&self.re).for_each(|(y, re)| *y += re);
+    }
 }

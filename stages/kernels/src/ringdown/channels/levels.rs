@@ -46,6 +46,32 @@ pub(super) fn density(noise: &RingdownNoise, interval_s: f64, turn: f64) -> f64 
     Density::of(noise, interval_s).at(turn)
 }
 
+/// The envelope of a line, and sums of its powers up to each sample.
+struct Envelope {
+    weights: Vec<f64>,
+    squares: Vec<f64>,
+    fourths: Vec<f64>,
+}
+
+impl Envelope {
+    /// Until nothing of the line is left, of the longest record at most.
+    fn of(pole: c64, records: &Records<'_>) -> Self {
+        let rate = (-pole.re * records.interval_s).max(1e-300);
+        let samples = records.longest.min((GONE / rate).ceil().max(16.0) as usize);
+        let weights: Vec<f64> = (0..samples).map(|k| (-rate * k as f64).exp()).collect();
+        let sums = |power: i32| {
+            let mut sum = 0.0;
+            let add = |weight: &f64| {
+                sum += weight.powi(power);
+                sum
+            };
+            weights.iter().map(add).collect()
+        };
+        let (squares, fourths) = (sums(2), sums(4));
+        Self { weights, squares, fourths }
+    }
+}
+
 /// What is left of a record round a pole.
 struct Around {
     /// Mean power, as a variance per sample.
@@ -57,21 +83,12 @@ struct Around {
 impl Around {
     /// Method: periodogram of the residual times the line's own envelope, so that what counts is what the line's
     /// amplitude and pole are estimated from.
-    fn of(left: &[f64], pole: c64, records: &Records<'_>) -> Self {
+    fn of(left: &[f64], pole: c64, envelope: &Envelope, records: &Records<'_>) -> Self {
         let interval_s = records.interval_s;
-        let rate = (-pole.re * interval_s).max(1e-300);
-        let samples = left.len().min((GONE / rate).ceil().max(16.0) as usize);
+        let samples = left.len().min(envelope.weights.len());
         let plan = records.plans.of((2 * samples).next_power_of_two());
-        let (mut square, mut fourth) = (0.0, 0.0);
-        let damped: Vec<f64> = (left[..samples].iter().enumerate())
-            .map(|(k, y)| {
-                let weight = (-rate * k as f64).exp();
-                square += weight.powi(2);
-                fourth += weight.powi(4);
-                y * weight
-            })
-            .collect();
-        let power = plan.power(damped);
+        let (square, fourth) = (envelope.squares[samples - 1], envelope.fourths[samples - 1]);
+        let power = plan.power(left[..samples].iter().zip(&envelope.weights).map(|(y, weight)| y * weight));
         let turn = std::f64::consts::TAU / plan.samples() as f64;
         let (from, to) = band(pole, interval_s, samples);
         let bins = ((from / turn).ceil().max(1.0) as usize)..=((to / turn).floor() as usize).min(power.len() - 2);
@@ -106,8 +123,9 @@ fn excess(
     chosen: &dyn Fn(usize) -> bool,
 ) -> Option<(f64, f64)> {
     let (mut sum, mut cells, mut members, mut absorbed) = (0.0, 0.0, 0.0, 0.0);
+    let envelope = Envelope::of(pole, records);
     for (r, record) in records.all.iter().enumerate().filter(|(r, _)| chosen(*r)) {
-        let around = Around::of(&left[r], pole, records);
+        let around = Around::of(&left[r], pole, &envelope, records);
         let share = record.observed() as f64 / record.values.len() as f64;
         sum += around.power / share / expected(record.channel) * around.cells;
         cells += around.cells;

@@ -3,9 +3,9 @@
 //! [`fit_channels`] is the front door. In reading order: options, records (what is fitted), basis, recursion and
 //! projection (amplitudes solved for), fit (the search on poles), noise (of each channel), levels (of what
 //! is left round a line), bank (where another mode may be), order
-//! (how many there are), shape (rank-one residues), result,
+//! (how many there are), start (of a given number), shape (rank-one residues), result,
 //! companions (what is no mode), course (whether modes move: [`follow_channels`]), lines and laws (those that follow laws of their
-//! amplitude), systems (whether all hits are of one:
+//! amplitude), own (each hit's poles) and systems (whether all hits are of one:
 //! [`hit_systems`]).
 
 mod bank;
@@ -23,6 +23,7 @@ mod lines;
 mod noise;
 mod options;
 mod order;
+mod own;
 mod projection;
 mod records;
 mod recursion;
@@ -30,6 +31,7 @@ mod result;
 mod rows;
 mod shape;
 mod sidebands;
+mod start;
 mod systems;
 #[cfg(test)]
 mod systems_tests;

@@ -6,8 +6,10 @@ use super::fit::{ARRIVED, Fitted, NEARLY};
 use super::levels::{density, flat, local_variances, residuals};
 use super::noise::{NoiseModel, degrees, first_noise, rescaled};
 use super::options::{ChannelNoise, ChannelOptions, ModesWanted};
+use super::own::OwnPoles;
 use super::records::Records;
 use super::result::{ChannelRingdown, OrderTried};
+use super::start::shift_invariant;
 use crate::model::{ModelError, finite, go_on};
 use crate::ringdown::RingdownNoise;
 use crate::statistics::chi_square_tail;
@@ -28,7 +30,7 @@ const STRONG: f64 = 0.05;
 /// Share of a mode's gain that the bank sees at least: its places are coarse, and other modes have moved.
 const BANK: f64 = 0.5;
 /// Weighted square of a mode's amplitudes over its gain from which on no fit without it is tried.
-const CERTAIN: f64 = 10.0;
+pub(super) const CERTAIN: f64 = 10.0;
 /// Operations of a step up to which noise is whitened that is not flat over a mode's line: a tenth of a second. Beyond,
 /// least squares stay unbiased and lose a little.
 const WHITENED: f64 = 5e7;
@@ -67,6 +69,16 @@ pub fn fit_channels(
     interval_s: f64,
     options: &ChannelOptions,
 ) -> Result<ChannelRingdown, ModelError> {
+    Ok(fit_with_hits(events, free, interval_s, options)?.0)
+}
+
+/// The same, and the poles of each hit by itself; none of one that shows no mode for certain.
+pub(super) fn fit_with_hits(
+    events: &[Vec<&[f64]>],
+    free: &[Vec<&[f64]>],
+    interval_s: f64,
+    options: &ChannelOptions,
+) -> Result<(ChannelRingdown, Vec<Option<OwnPoles>>), ModelError> {
     for stretch in free.iter().flatten() {
         finite("free stretch", stretch)?;
     }
@@ -74,7 +86,10 @@ pub fn fit_channels(
     let records = Records::of(events, interval_s, options)?;
     let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
     let (step, seen) = if options.start.is_empty() { ladder.climb()? } else { (ladder.given(), Vec::new()) };
-    ChannelRingdown::of(&records, ladder.refined(step), seen)
+    let refined = ladder.refined(step);
+    let all = ChannelRingdown::of(&records, &refined, seen)?;
+    let hits = OwnPoles::of_hits(&records, &refined, &all, options.false_alarm);
+    Ok((all, hits))
 }
 
 /// The fit from the poles of the options, those left out that the others make up for; none where a mode more explains
@@ -89,20 +104,17 @@ pub(super) fn explained(
     let ladder = Ladder { records: &records, noise: NoiseModel::new(&records, free, &options.noise), options };
     let mut tried = Vec::new();
     let step = ladder.pruned(ladder.given(), &mut tried);
-    let lasts = |step: &Step| step.fitted.poles.0.last().copied();
     let silent = || {
         let none = ladder.mark(&ladder.settled(ladder.weighed(&Poles(Vec::new()), &step.weights)));
-        lasts(&step).is_none_or(|place| ladder.by_chance(ladder.gain(&none, &step, &[place]), 1))
+        step.last_pole().is_none_or(|place| ladder.by_chance(ladder.gain(&none, &step, &[place]), 1))
     };
     if step.fitted.poles.0.len() < 2 && silent() {
         return None;
     }
-    if let Some(more) = ladder.next(&step, None, false)
-        && lasts(&more).is_some_and(|place| !ladder.by_chance(ladder.gain(&ladder.mark(&step), &more, &[place]), 1))
-    {
+    if ladder.leaves_a_mode(&step) {
         return None;
     }
-    ChannelRingdown::of(&records, ladder.refined(step), tried).ok()
+    ChannelRingdown::of(&records, &ladder.refined(step), tried).ok()
 }
 
 /// A fit with its noise.
@@ -116,6 +128,12 @@ struct Step {
     energy: Vec<f64>,
     /// Minus twice the log-likelihood under its noise, where it was asked for.
     coloured: OnceCell<f64>,
+}
+
+impl Step {
+    fn last_pole(&self) -> Option<c64> {
+        self.fitted.poles.0.last().copied()
+    }
 }
 
 /// What later steps are compared with.
@@ -263,6 +281,9 @@ impl Ladder<'_> {
             ModesWanted::Fixed(count) => (count, count),
             ModesWanted::AtMost(count) => (0, count),
         };
+        if let Some(found) = self.at_once(least) {
+            return Ok(found);
+        }
         let mut current = self.weighed(&Poles(Vec::new()), &self.first_noise());
         let mut needed = self.mark(&current);
         // without a mode all is noise: what that explains needs none
@@ -302,6 +323,31 @@ impl Ladder<'_> {
         }
         let step = best.unwrap_or(current);
         Ok((if least == 0 { self.pruned(step, &mut seen) } else { step }, seen))
+    }
+
+    /// A given number of modes from where the records' Hankel matrices have them; none unless each is certain and a
+    /// further one would explain no more than chance does.
+    fn at_once(&self, modes: usize) -> Option<(Step, Vec<OrderTried>)> {
+        if modes == 0 {
+            return None;
+        }
+        let noise = self.first_noise();
+        let start = shift_invariant(self.records, &noise, modes, self.options.least_quality_factor)?;
+        let step = self.settled(self.weighed(&start, &noise));
+        let certain = |j: usize| !self.by_chance(step.fitted.projection.strength(j) / CERTAIN, 1);
+        if !(0..modes).all(certain) || self.leaves_a_mode(&step) {
+            return None;
+        }
+        let none = self.mark(&self.weighed(&Poles(Vec::new()), &noise));
+        let gain = self.white_gain(&none, &step, &step.fitted.poles.0);
+        Some((step, vec![OrderTried { modes, gain, kept: true }]))
+    }
+
+    /// Whether a mode more explains more than chance does.
+    fn leaves_a_mode(&self, step: &Step) -> bool {
+        self.next(step, None, false).is_some_and(|more| {
+            more.last_pole().is_some_and(|place| !self.by_chance(self.gain(&self.mark(step), &more, &[place]), 1))
+        })
     }
 
     /// The best fit with a mode more; none where nothing is left that may be one, unless one is `wanted`.
@@ -420,4 +466,14 @@ pub(super) struct Refined {
     pub noise: Vec<RingdownNoise>,
     /// Per channel and mode: density of the noise at the mode over the level under which it was fitted.
     pub levels: Vec<Vec<f64>>,
+}
+
+impl Refined {
+    /// Numbers of the modes, ascending by natural frequency.
+    pub fn order(&self) -> Vec<usize> {
+        let poles = &self.fitted.poles.0;
+        let mut order: Vec<usize> = (0..poles.len()).collect();
+        order.sort_by(|&a, &b| poles[a].norm().total_cmp(&poles[b].norm()));
+        order
+    }
 }

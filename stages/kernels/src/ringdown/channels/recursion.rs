@@ -3,7 +3,7 @@
 use faer::{Mat, MatRef, c64};
 
 use super::basis::{Poles, columns, own_count};
-use crate::linear_algebra::{TallQr, product};
+use crate::linear_algebra::{TallQr, dot_in_lanes, product};
 
 /// Samples of a block: its exponentials serve all blocks.
 const BLOCK: usize = 128;
@@ -134,7 +134,7 @@ impl<'a> Recursion<'a> {
         self.backward(&mut amplitudes);
         let left = self.left(signal, &amplitudes);
         let rest = self.forward(&self.products(&left));
-        let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        let square = |values: &[f64]| dot_in_lanes(values, values);
         let (all, own_left) = (square(signal), square(&left));
         let energy = own_left - square(&rest);
         // least squares leave no more than there is

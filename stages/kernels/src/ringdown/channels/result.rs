@@ -68,21 +68,29 @@ pub struct ChannelRingdown {
     pub seen: Vec<OrderTried>,
 }
 
+impl RecordFit {
+    /// Square of a mode's residue over its variance.
+    pub(super) fn strength(&self, mode: usize) -> f64 {
+        let (z, [rr, ri, ii]) = (self.residues[mode], self.residue_covariance[mode]);
+        let square = (ii * z.re * z.re - 2.0 * ri * z.re * z.im + rr * z.im * z.im) / (rr * ii - ri * ri);
+        if square.is_finite() { square.max(0.0) } else { 0.0 }
+    }
+}
+
 impl ChannelRingdown {
-    pub(super) fn of(records: &Records<'_>, refined: Refined, seen: Vec<OrderTried>) -> Result<Self, ModelError> {
+    pub(super) fn of(records: &Records<'_>, refined: &Refined, seen: Vec<OrderTried>) -> Result<Self, ModelError> {
         let Refined { fitted, noise, levels } = refined;
         let modes = fitted.poles.0.len();
-        let lack = lack_of_fit(records, &residuals(records, &fitted), &fitted.poles, &noise);
+        let lack = lack_of_fit(records, &residuals(records, fitted), &fitted.poles, noise);
         // variance round mode j of a record over that of the fit
         let level = |r: usize, j: usize| levels[records.all[r].channel][j] * lack[j];
-        let scaled = sandwich(&fitted, &level);
+        let scaled = sandwich(fitted, &level);
         if (0..2 * modes).any(|i| !(scaled[(i, i)].is_finite() && scaled[(i, i)] > 0.0)) {
             return Err(ModelError::Degenerate("no finite covariance"));
         }
-        let degrees = degrees(records, &fitted);
+        let degrees = degrees(records, fitted);
         let reduced_chi_square = fitted.energy.iter().zip(&degrees).map(|(e, d)| e / d).collect();
-        let mut order: Vec<usize> = (0..modes).collect();
-        order.sort_by(|&a, &b| fitted.poles.0[a].norm().total_cmp(&fitted.poles.0[b].norm()));
+        let order = refined.order();
         let own: Vec<Mat<f64>> = fitted
             .projection
             .solved
@@ -139,7 +147,7 @@ impl ChannelRingdown {
             covariance: Mat::from_fn(2 * modes, 2 * modes, |i, j| unit * scaled[(place(i), place(j))]),
             records: fits,
             shapes,
-            noise,
+            noise: noise.clone(),
             reduced_chi_square,
             lack_of_fit: order.iter().map(|&j| lack[j]).collect(),
             verdict: fitted.verdict,

@@ -8,7 +8,8 @@ use super::course::{FAR, MOVES, Motion, follow_channels, no_modes};
 use super::laws::{TOGETHER, resolution};
 use super::lines::near;
 use super::options::{ChannelOptions, ModesWanted};
-use super::order::{explained, fit_channels};
+use super::order::{explained, fit_with_hits};
+use super::own::OwnPoles;
 use super::result::ChannelRingdown;
 use crate::ringdown::ModeEstimate;
 use crate::statistics::chi_square_tail;
@@ -51,7 +52,9 @@ struct Alone {
 /// # Model
 /// As [`fit_channels`](super::fit_channels), for the hits of each system; a system has modes of its own.
 /// # Method
-/// All hits are fitted together, then each by itself from those modes, without those that the others make up for. Where
+/// All hits are fitted together. They are of one system where one step from those poles for each hit by itself leads no
+/// further than noise does, and all show the strongest mode. Else each is fitted by itself from those modes, without those
+/// that the others make up for. Where
 /// two of them lie near each other, or hits do not share a mode, each is fitted from nothing, six modes at most, as is a
 /// hit of which more than noise is left. From the one with the most energy on, each joins the first system with whose
 /// first hit it has a mode in common: the strongest of either is one of the other's. Two poles are of one
@@ -71,13 +74,17 @@ pub fn hit_systems(
     interval_s: f64,
     options: &ChannelOptions,
 ) -> HitSystems {
-    let joint = fit_channels(events, free, interval_s, options).ok();
+    let (joint, own) = fit_with_hits(events, free, interval_s, options).ok().unzip();
     let of = |hit: usize| Hit { event: &events[hit], hit, free, interval_s, options };
     let quick = |poles: &[c64]| -> Vec<Option<Alone>> {
         let alone = |hit| Alone::explained(&of(hit), poles).or_else(|| Alone::of(&of(hit)));
         (0..events.len()).into_par_iter().map(alone).collect()
     };
     if let Some(all) = joint.as_ref().filter(|all| apart(&all.poles, interval_s, events)) {
+        let longest = events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
+        if let Some(strongest) = own.as_deref().and_then(|own| of_one(own, all, interval_s, longest)) {
+            return HitSystems { strongest, systems: vec![(0..events.len()).collect()], joint };
+        }
         let alone = quick(&all.poles);
         let systems = grouped(&alone);
         if systems.len() == 1 {
@@ -88,6 +95,23 @@ pub fn hit_systems(
     let systems = grouped(&alone);
     let joint = joint.filter(|_| systems.len() == 1);
     HitSystems { strongest: strongest(&alone), systems, joint }
+}
+
+/// The strongest mode of each hit, where one step from the poles of all hits shows that they are of one system: each is
+/// away from these by no more than noise, and the strongest mode of the hit with the most energy is one of every other's.
+fn of_one(
+    own: &[Option<OwnPoles>],
+    all: &ChannelRingdown,
+    interval_s: f64,
+    samples: usize,
+) -> Option<Vec<Option<ModeEstimate>>> {
+    let none: Vec<usize> = no_modes(all, interval_s, samples).ok()?.iter().map(|(j, _)| *j).collect();
+    let own: Vec<&OwnPoles> = own.iter().map(Option::as_ref).collect::<Option<_>>()?;
+    let strongest: Vec<(f64, usize, ModeEstimate)> =
+        own.iter().map(|hit| hit.strongest(&none)).collect::<Option<_>>()?;
+    let (_, common, _) = strongest.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let is_one = |hit: &&OwnPoles| hit.modes.contains(common) && hit.chance * own.len() as f64 >= MOVES;
+    own.iter().all(is_one).then(|| strongest.iter().map(|(_, _, mode)| Some(*mode)).collect())
 }
 
 /// Whether no two lines are near each other: together they may stand for another damping, or for a motion.

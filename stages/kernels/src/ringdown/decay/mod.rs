@@ -11,4 +11,4 @@ mod sums;
 mod tests;
 
 pub use fit::{Decay, DecayOptions, fit_decay};
-pub(super) use start::centred_gram;
+pub(super) use start::{centred_gram, poles_of_gram};

@@ -15,7 +15,13 @@ use crate::model::ModelError;
 /// S. Y. Kung, Proc. 12th Asilomar Conf. (1978) 705; orthogonal iteration: G. H. Golub and C. F. Van Loan, Matrix
 /// Computations, 4th ed., 8.2.4.
 pub(super) fn hankel_poles(values: &[f64], rows: usize, order: usize) -> Result<Vec<c64>, ModelError> {
-    let space = dominant_space(&centred_gram(values, rows, dot_in_lanes), order);
+    poles_of_gram(&centred_gram(values, rows, dot_in_lanes), order)
+}
+
+/// The same from the sum of the Gram matrices of several records.
+pub(in crate::ringdown) fn poles_of_gram(gram: &Mat<f64>, order: usize) -> Result<Vec<c64>, ModelError> {
+    let space = dominant_space(gram, order);
+    let rows = gram.nrows();
     let upper = space.as_ref().get(..rows - 1, ..);
     let lower = space.as_ref().get(1.., ..);
     // columns are orthonormal: the normal equations are as well conditioned as the problem
