@@ -42,6 +42,8 @@ pub struct Choice<'a> {
     pub period_samples: Option<usize>,
     /// Samples of the segments of an averaged spectrum that resolve its resonance.
     pub segment_samples: Option<usize>,
+    /// Whether the noise is that of force curves' free stretches.
+    pub free_stretches: bool,
     /// What files and channels are, where the stage's default is not meant.
     pub records_are: Option<RecordsAre>,
     /// Of a diagnosis of anything but releases, whose goal says it: what it needs beside the channels.
@@ -64,6 +66,7 @@ impl<'a> Choice<'a> {
             struck: false,
             period_samples: None,
             segment_samples: None,
+            free_stretches: false,
             records_are: None,
             diagnosis: None,
             why,
@@ -128,7 +131,7 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
             Some(question) => Err(question),
             None => input_output(file, wanted, Some(goal)),
         },
-        Some(goal) => Ok(thermal(file, one_channel(source, wanted, goal, String::new())?)),
+        Some(goal) => Ok(thermal(file, wanted, one_channel(source, wanted, goal, String::new())?)),
     }
 }
 
@@ -299,9 +302,15 @@ fn resonates(signals: &[Vec<f64>]) -> bool {
     signals.iter().any(|values| resonance_segment(values).is_some())
 }
 
-/// The resonance in a channel's noise.
-fn thermal<'a>(file: &FirstFile<'a>, choice: Choice<'a>) -> Choice<'a> {
+/// The resonance in a channel's noise; of force curves in that of their free stretches.
+fn thermal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, choice: Choice<'a>) -> Choice<'a> {
     let channel = choice.channels.first().filter(|_| choice.goal == Goal::Thermal);
+    if channel.is_some()
+        && let Some(curves) = force_curve(file, wanted)
+    {
+        let why = format!("the lever's noise in the free stretches of force curves ({curves})");
+        return Choice { free_stretches: true, why, ..choice };
+    }
     let segment_samples = channel.and_then(|channel| resonance_segment(&file.samples(channel).ok()?));
     Choice { segment_samples, ..choice }
 }
@@ -375,7 +384,7 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
                 return Err(several_in_noise(source, &channels));
             }
             let reason = if found.random { reason } else { "noise with a resonance in it".to_owned() };
-            return Ok(thermal(file, other(Goal::Thermal, format!("{record}: {reason}"))?));
+            return Ok(thermal(file, wanted, other(Goal::Thermal, format!("{record}: {reason}"))?));
         }
         (None, Some(reason)) if guessed => {
             let none = format!("{reason}; no steady oscillation and no resonance in noise either");

@@ -156,8 +156,12 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 text.push_str(&format!("params = {{ blocks = \"{blocks}\"{before}{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
-                let samples = choice.segment_samples.unwrap_or_else(|| segment_samples(choice.channels[0].samples));
-                text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"all\" }}\n"));
+                let usual = segment_samples(choice.channels[0].samples);
+                let (stretches, samples) = match choice.free_stretches {
+                    true => ("free", usual.min(MOST_FREE_SAMPLES)),
+                    false => ("all", choice.segment_samples.unwrap_or(usual)),
+                };
+                text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"{stretches}\" }}\n"));
             }
             _ => {
                 if line == "[pipeline]" && !choice.why.is_empty() {
@@ -172,6 +176,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
     }
     if points { points::in_place_of_one(&text, source, choice, wanted, folder) } else { Ok(text) }
 }
+
+/// Samples of a segment of free stretches, at most: as the stage has it by default.
+const MOST_FREE_SAMPLES: usize = 16_384;
 
 /// The `params` of the stage `records`.
 fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {

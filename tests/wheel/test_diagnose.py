@@ -117,6 +117,14 @@ def test_a_decays_model_goes_on_without_an_input():
         found.model.simulate()
 
 
+def test_what_is_unexplained_is_printed_with_the_reason():
+    u, y, _ = driven(6)
+    found = afmid.diagnose(y, u, sample_rate_hz=1e3, remove="none", candidates="offset")
+    lines = found.summary().splitlines()
+    assert lines[0] == found.verdict == "unexplained", lines
+    assert any(line.startswith("- ") for line in lines) and "<li>" in found._repr_html_()
+
+
 def test_a_cause_that_is_none_is_refused():
     with pytest.raises(afmid.DataError, match="no-such-cause"):
         afmid.diagnose(friction(1, 0.0), sample_rate_hz=RATE_HZ, begin=0, candidates=["no-such-cause"])

@@ -6,7 +6,9 @@ import warnings
 import afmid
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
+import xarray as xr
 
 RATE_HZ = 5e4
 # undamped frequency, quality factor, amplitude at the two sensors
@@ -71,6 +73,23 @@ def test_axes_are_asked_for_where_two_may_be_either():
     assert alone.shapes.sizes["channel"] == 1 and alone.details["hits"] == 3
 
 
+def test_labels_say_what_axes_are():
+    y = record(0)
+    of_array = afmid.ringdown(y, sample_rate_hz=RATE_HZ, axes="channels", channels=["tip", "root"])
+    frame = pd.DataFrame({"tip": y[0], "root": y[1]})
+    labelled = xr.DataArray(y.T, dims=("time", "channel"), coords={"channel": ["tip", "root"]})
+    for same in (frame, labelled):
+        found = afmid.ringdown(same, sample_rate_hz=RATE_HZ)
+        assert found.modes.equals(of_array.modes) and found.shapes.channel.values.tolist() == ["tip", "root"]
+    alone = afmid.ringdown(y[:1].T, sample_rate_hz=RATE_HZ)
+    assert alone.modes.equals(afmid.ringdown(y[0], sample_rate_hz=RATE_HZ).modes)
+    masked = np.ma.array(record(1, quiet=0)[0])
+    masked[5000:5100] = 50.0
+    masked[5000:5100] = np.ma.masked
+    gap = afmid.ringdown(masked, sample_rate_hz=RATE_HZ, begin=0)
+    assert gap.modes.equals(afmid.ringdown(masked.filled(np.nan), sample_rate_hz=RATE_HZ, begin=0).modes)
+
+
 def test_given_decays_begin_at_their_first_sample():
     y = record(1, quiet=0)[0]
     found = afmid.ringdown(y, sample_rate_hz=RATE_HZ, begin=0)
@@ -81,6 +100,11 @@ def test_given_decays_begin_at_their_first_sample():
     assert np.all(abs(missing.modes.frequency_hz - found.modes.frequency_hz) < 3 * found.modes.frequency_std_hz)
     unequal = afmid.ringdown([y, y[:9000]], sample_rate_hz=RATE_HZ, begin=0, axes="hits")
     assert unequal.details["hits"] == 2
+
+
+def test_a_mode_that_was_not_asked_for_is_said():
+    with pytest.warns(afmid.AfmidWarning, match="1 mode is wanted, and one more explains more than noise"):
+        afmid.ringdown(record(0)[0], sample_rate_hz=RATE_HZ, modes=1)
 
 
 def test_warnings_and_errors_have_the_program_s_words():

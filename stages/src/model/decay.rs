@@ -211,6 +211,15 @@ impl DecayFit {
 
     /// Warns where something does not fit; `found`: exponentials that were fitted, of which some may be no modes.
     fn warn(&self, fit: &ChannelRingdown, found: usize, decays: &Decays<'_>, cx: &Context) {
+        if let Count::Fixed(modes) = self.modes
+            && fit.seen.iter().any(|tried| tried.modes == modes + 1)
+        {
+            cx.warn(format!(
+                "{modes} {} wanted, and one more explains more than noise does: more may ring, or one moves; `modes = \
+                 \"auto\"` takes as many as the data show",
+                if modes == 1 { "mode is" } else { "modes are" }
+            ));
+        }
         if !fit.verdict.converged {
             cx.warn(format!(
                 "no minimum after {} steps: the last was {:.2} standard errors",

@@ -4,6 +4,20 @@ use afmid_pipeline::StageError;
 
 use afmid_kernels::validation::single_sine;
 
+/// Errors: the input does not change.
+pub(super) fn require_a_change(input: &[f64]) -> Result<(), StageError> {
+    let Some((first, rest)) = input.split_first() else { return Ok(()) };
+    if rest.iter().any(|value| value != first) {
+        return Ok(());
+    }
+    let problem =
+        format!("the input is {first} throughout: it does nothing, and the output says nothing of a response");
+    Err(StageError::new(problem).help(
+        "begin the record before the input changes; of a free motion `model.decay` finds the modes (`afmid.ringdown` in \
+         Python)",
+    ))
+}
+
 /// Errors: the input is one sine and nothing else of it shows in the output, so that a model says nothing elsewhere.
 pub(super) fn require_more_than_a_sine(input: &[f64], output: &[f64], rate_hz: f64) -> Result<(), StageError> {
     let Some(sine) = single_sine(input, output) else { return Ok(()) };
@@ -30,9 +44,11 @@ mod tests {
 
     /// A lag of a few samples that answers a sine, or a sine and a step; the output with noise.
     fn pair(cycles: f64, step: f64) -> Ports {
-        let samples = 600;
-        let u: Vec<f64> =
-            (0..samples).map(|k| (TAU * cycles * k as f64).sin() + if k > 250 { step } else { 0.0 }).collect();
+        pair_of((0..600).map(|k| (TAU * cycles * k as f64).sin() + if k > 250 { step } else { 0.0 }).collect())
+    }
+
+    fn pair_of(u: Vec<f64>) -> Ports {
+        let samples = u.len();
         let mut y = vec![0.0; samples];
         for k in 1..samples {
             y[k] = 0.8 * y[k - 1] + 0.2 * u[k - 1];
@@ -45,6 +61,17 @@ mod tests {
             .with("response", "V", "output", &["time"], y)
             .attribute("sample_rate_hz", 200.0);
         Ports::new().with(&PAIR, array)
+    }
+
+    #[test]
+    fn a_model_of_an_input_that_does_nothing_is_refused() {
+        let still = pair_of(vec![0.3; 600]);
+        let subspace = SubspaceEstimate { weight: afmid_kernels::subspace::Weight::Cva, ..SubspaceEstimate::default() };
+        let pem = Pem { order: crate::model::Count::Fixed(1), ..Pem::default() };
+        for refused in [pem.run(&still, &Context::alone(0)), subspace.run(&still, &Context::alone(0))] {
+            let refused = refused.unwrap_err();
+            assert!(refused.problem.starts_with("the input is 0.3 throughout: it does nothing"), "{}", refused.problem);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::excitation::require_more_than_a_sine;
+use super::excitation::{require_a_change, require_more_than_a_sine};
 use super::order::{Order, choice_document, simulated_percent};
 use super::whiteness::{coloured, residual_share, test_document};
 use crate::artifacts::{DataSet, Pair, PairSeries, SAMPLE_RATE_HZ, state_nuisances, state_space, state_t0_ambiguity};
@@ -109,6 +109,7 @@ impl Stage for Pem {
         self.require_set(&pair)?;
         let (rate, first) = (pair.sample_rate_hz()?, pair.first_sample(self.before_s)?);
         let PairSeries { input, output, time, unit, .. } = pair.series(self.set, first)?;
+        require_a_change(&input)?;
         require_more_than_a_sine(&input, &output, rate)?;
         let experiment = Experiment { input: &input, output: &output };
         let choice = match self.order {

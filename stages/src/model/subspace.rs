@@ -4,7 +4,7 @@ use afmid_pipeline::{Context, Example, Faults, Ports, Spec, Stage, StageError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::excitation::require_more_than_a_sine;
+use super::excitation::{require_a_change, require_more_than_a_sine};
 use super::order::Order;
 use super::pem::PAIR;
 use super::realised::{MODEL, Realised, SUMMARY};
@@ -83,6 +83,10 @@ impl Stage for SubspaceEstimate {
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let series = Pair::new(inputs.get(&PAIR)?).series(self.set, 0)?;
+        // of events the input may be over before the first sample that is fitted
+        if self.weight != Weight::Release {
+            require_a_change(&series.input)?;
+        }
         require_more_than_a_sine(&series.input, &series.output, series.rate)?;
         let choice = match self.order {
             Order::Fixed(_) => None,

@@ -80,7 +80,7 @@ impl Stage for Thermal {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "spectrum.thermal",
-        version: 4,
+        version: 5,
         summary: "fits resonance, quality factor and noise levels to a thermal spectrum",
         inputs: &[DENSITY.spec()],
         outputs: &[FIT.spec(), LINES.spec(), SUMMARY.spec()],

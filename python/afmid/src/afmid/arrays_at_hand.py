@@ -17,19 +17,24 @@ def rate(sample_rate_hz: Any) -> float:
     >>> rate(5e6)
     5000000.0
     """
-    found = float(sample_rate_hz)
+    try:
+        found = float(sample_rate_hz)
+    except (TypeError, ValueError):
+        found = np.nan
     if not (np.isfinite(found) and found > 0):
-        raise DataError(f"sample_rate_hz is {found}, wanted a positive number of samples per second")
+        raise DataError(f"sample_rate_hz is {sample_rate_hz!r}, wanted a positive number of samples per second")
     return found
 
 
 def real(values: Any, what: str) -> Array:
-    """An array of real numbers. Errors: `DataError`, no numbers, or complex ones.
+    """An array of real numbers, NaN where a masked array is masked. Errors: `DataError`, no numbers, or complex ones.
 
     >>> real([1, 2], "y").dtype
     dtype('float64')
+    >>> real(np.ma.array([1, 2], mask=[False, True]), "y")
+    array([ 1., nan])
     """
-    found = np.asarray(values)
+    found = _unmasked(values)
     if found.dtype == object or not (np.issubdtype(found.dtype, np.number) or found.dtype == bool):
         raise DataError(f"{what} is an array of {found.dtype}, wanted numbers")
     if np.iscomplexobj(found):
@@ -43,10 +48,51 @@ def complex_values(values: Any, what: str) -> Array:
     >>> complex_values([1, 2j], "responses")
     array([1.+0.j, 0.+2.j])
     """
-    found = np.asarray(values)
+    found = _unmasked(values)
     if found.dtype == object or not np.issubdtype(found.dtype, np.number):
         raise DataError(f"{what} is an array of {found.dtype}, wanted numbers")
     return np.ascontiguousarray(found, dtype=np.complex128)
+
+
+def _unmasked(values: Any) -> Array:
+    if isinstance(values, np.ma.MaskedArray) and np.issubdtype(values.dtype, np.number):
+        return np.asarray(np.ma.filled(values.astype(np.result_type(values.dtype, np.float64)), np.nan))
+    return np.asarray(values)
+
+
+CHANNELS = ("channel", "channels", "sensor", "sensors")
+HITS = ("hit", "hits", "event", "events", "record", "records")
+
+
+def labelled(y: Any, axes: str | None) -> tuple[Any, str | None, list[str] | None]:
+    """Samples with their labels: samples last, what a first of two axes counts where a name says it, and names of the
+    channels. A DataFrame has a channel in every column.
+
+    >>> import pandas as pd
+    >>> frame = pd.DataFrame({"tip": [1.0, 2.0, 3.0], "root": [0.0, 1.0, 2.0]})
+    >>> values, axes, channels = labelled(frame, None)
+    >>> values.shape, axes, channels
+    ((2, 3), 'channels', ['tip', 'root'])
+    >>> import xarray as xr
+    >>> labelled(xr.DataArray(np.zeros((5, 2)), dims=("time", "hit")), None)[:2][1]
+    'hits'
+    """
+    columns = getattr(y, "columns", None)
+    if columns is not None and np.ndim(y) == 2:
+        return y.to_numpy().T, axes or "channels", [str(name) for name in columns]
+    dims = getattr(y, "dims", None)
+    if dims is None or not all(isinstance(dim, str) for dim in dims):
+        return y, axes, None
+    of_channels = [dim for dim in dims if dim in CHANNELS]
+    of_hits = [dim for dim in dims if dim in HITS]
+    of_samples = [dim for dim in dims if dim not in (*CHANNELS, *HITS)]
+    if len(of_samples) != 1 or len(of_channels) > 1 or len(of_hits) > 1:
+        return y, axes, None
+    channels = None
+    if of_channels and of_channels[0] in getattr(y, "coords", {}):
+        channels = [str(name) for name in np.asarray(y.coords[of_channels[0]])]
+    said = "channels" if of_channels and not of_hits else "hits" if of_hits and not of_channels else None
+    return y.transpose(*of_hits, *of_channels, *of_samples).to_numpy(), axes or said, channels
 
 
 def records(y: Any, axes: str | None) -> list[list[Array]]:
@@ -64,19 +110,21 @@ def records(y: Any, axes: str | None) -> list[list[Array]]:
         if len(lengths) > 1:
             return _unequal(y, axes)
     found = real(y, "y")
+    if found.ndim == 2 and 1 in found.shape:
+        found = found.ravel()
     if found.ndim == 1:
         return [[found]]
     if found.ndim == 2:
         if axes not in (None, "hits", "channels"):
             raise DataError(f'axes is {axes!r}, wanted "hits" or "channels": what the first axis of y counts')
+        if found.shape[0] > found.shape[1]:
+            raise DataError(
+                f"y has the shape {found.shape}: {found.shape[0]} rows of {found.shape[1]} samples", help="is y.T meant?"
+            )
         if axes is None:
             raise DataError(
                 f"y has the shape {found.shape}: whether its {found.shape[0]} rows are hits or channels is not said",
                 help='give axes="hits" or axes="channels"',
-            )
-        if found.shape[0] > found.shape[1]:
-            raise DataError(
-                f"y has the shape {found.shape}: {found.shape[0]} rows of {found.shape[1]} samples", help="is y.T meant?"
             )
         rows = list(found)
         return [[row] for row in rows] if axes == "hits" else [rows]
@@ -103,7 +151,9 @@ def recorded(values: Any, what: str) -> list[list[Array]]:
             if any(part.ndim > 2 for part in parts):
                 raise DataError(f"the records in {what} want one or two axes: samples; channels, samples")
             return [list(np.atleast_2d(part)) for part in parts]
-    found = real(values, what)
+    found = real(labelled(values, None)[0], what)
+    if found.ndim == 2 and found.shape[1] == 1:
+        found = found.T
     if not 1 <= found.ndim <= 3:
         wanted = "samples; channels, samples; or records, channels, samples"
         raise DataError(f"{what} has {found.ndim} axes, wanted {wanted}")
@@ -137,6 +187,7 @@ def names(channels: Sequence[str] | None, units: str | Sequence[str] | None, cou
     elif isinstance(channels, str):
         channels = [channels]
     of_each = [units or ""] * count if units is None or isinstance(units, str) else list(units)
-    if len(channels) != count or len(of_each) != count:
-        raise DataError(f"{len(channels)} names and {len(of_each)} units for {count} channels")
+    for found, of in ((channels, "names"), (of_each, "units")):
+        if len(found) != count:
+            raise DataError(f"{len(found)} {of} for {count} {what}s")
     return list(zip(map(str, channels), map(str, of_each), strict=True))

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from . import _native, artifacts
-from .arrays_at_hand import names, rate, records
+from .arrays_at_hand import labelled, names, rate, records
 from .errors import DataError
 from .estimate import ModalEstimate
 
@@ -50,7 +50,9 @@ def free_decays(
     units: str | Sequence[str] | None,
 ) -> tuple[Any, pd.DataFrame | None, list[str]]:
     """The decays in records, where they were found, and what is to be said of them; `begin`: see `ringdown`."""
+    y, axes, labels = labelled(y, axes)
     found = records(y, axes)
+    channels = channels or labels
     named = names(channels, units, len(found[0]), "channel")
     if begin == "auto":
         searched, said = artifacts.run_stage("events.decay", {"records": _native.recording(found, named, rate_hz)})
@@ -83,12 +85,13 @@ def ringdown(
     Parameters
     ----------
     y : array_like
-        (samples,), (hits, samples), (channels, samples) or (hits, channels, samples); a list where hits have unlike
-        lengths. NaN marks missing samples where `begin` is 0.
+        (samples,), (hits, samples) or (channels, samples) with `axes`, or (hits, channels, samples); a list where hits
+        have unlike lengths. A DataFrame has a channel in every column; of a DataArray the names `hit`, `channel` and
+        any third say which axis is which. NaN, or the mask of a masked array, marks missing samples where `begin` is 0.
     sample_rate_hz : float
         Samples per second.
     axes : {"hits", "channels"}, optional
-        What the first of two axes counts.
+        What the first of two axes counts, where no name says it.
     channels : sequence of str, optional
         Names of the channels.
     units : str or sequence of str, optional

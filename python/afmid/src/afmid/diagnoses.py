@@ -33,7 +33,7 @@ STAGE = "diagnosis.causes"
 class Diagnosis(Estimate):
     """What a linear model gets wrong, as `afmid.diagnose` returns it.
 
-    Printed: verdict, causes with their parameters and gains.
+    Printed: verdict, causes with their parameters and gains; where nothing is named, why not, and how far the models went.
 
     `details`: baseline, evidence, what else was tried: the document that `afmid show` prints.
     """
@@ -97,6 +97,17 @@ class Diagnosis(Estimate):
 
     def _title(self) -> str:
         return self.verdict
+
+    def _more(self) -> list[str]:
+        if self.verdict == "named":
+            return []
+        said = [str(sentence) for sentence in self.details.get("evidence", [])]
+        if len(self.ladder) > 1:
+            first, last = self.ladder.iloc[0], self.ladder.iloc[-1]
+            unit = str(self.details["ladder"][0].get("unit", "")).strip()
+            added = ", ".join(self.ladder["added"].iloc[1:])
+            said.append(f"tried: {added}: rms error {first.rms:.4g} -> {last.rms:.4g} {unit}".rstrip())
+        return said
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -195,10 +206,11 @@ def diagnose(
         inputs["pair"], said = pair_of_one_output(
             u, y, sample_rate_hz=rate_hz, remove=remove, input_unit=input_unit, output_unit=output_unit
         )
+    chosen = [candidates] if isinstance(candidates, str) else list(candidates)
     params: dict[str, Any] = {
         # causes of one's own are tried whatever is chosen from the catalogue
-        "candidates": [*candidates, *(one.id for one in causes if candidates)],
-        "without": list(without),
+        "candidates": [*chosen, *(one.id for one in causes if chosen)],
+        "without": [without] if isinstance(without, str) else list(without),
         "most_causes": most_causes,
         "false_alarm_rate": false_alarm_rate,
         "least_gain": least_gain,

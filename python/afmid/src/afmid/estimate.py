@@ -44,11 +44,15 @@ class Estimate:
         """A line above the table; none where it is empty."""
         return ""
 
+    def _more(self) -> list[str]:
+        """Sentences below the table."""
+        return []
+
     def summary(self) -> str:
         """The table, standard errors in brackets, and what is not alright, as text."""
         rows = self._rows()
         table = text_table(self.HEADS, rows) if rows else self.NO_ROWS
-        said = [f"warning: {text}" for text in self.warnings]
+        said = [f"- {text}" for text in self._more()] + [f"warning: {text}" for text in self.warnings]
         return "\n".join([*(part for part in (self._title(), table) if part), *said])
 
     def __repr__(self) -> str:
@@ -56,7 +60,7 @@ class Estimate:
 
     def _repr_html_(self) -> str:
         title = f"<p>{escape(self._title())}</p>" if self._title() else ""
-        return title + html_table(self.HEADS, self._rows(), self.warnings)
+        return title + html_table(self.HEADS, self._rows(), [*self._more(), *self.warnings])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

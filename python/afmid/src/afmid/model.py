@@ -137,6 +137,8 @@ class Model:
         if y is not None and y.shape != (self.C.shape[0], inputs.shape[1]):
             raise ValueError(f"y has shape {y.shape}, wanted {(self.C.shape[0], inputs.shape[1])}")
         x = np.array(self.x0 if x0 is None else x0, float)
+        if x.shape != (self.order,):
+            raise ValueError(f"x0 has shape {x.shape}, wanted {(self.order,)}: a number for every state")
         out = np.empty((self.C.shape[0], inputs.shape[1]))
         for t, now in enumerate(inputs.T):
             out[:, t] = self.C @ x + self.D @ now

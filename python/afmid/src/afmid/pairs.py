@@ -51,7 +51,9 @@ def pair_of_one_output(u: Any, y: Any, *, output: str | None = None, **given: An
     afmid.errors.DataError: y has the shape (2, 100), wanted one output: (samples,)
     """
     shape = np.shape(y)
-    if len(shape) != 1:
+    if len(shape) == 2 and shape[1] == 1:
+        y = np.asanyarray(y).ravel()
+    elif len(shape) != 1:
         raise DataError(f"y has the shape {shape}, wanted one output: (samples,)")
     if np.ndim(u) not in (1, 2):
         raise DataError(f"u has {np.ndim(u)} axes, wanted (samples,) or (inputs, samples)")

@@ -58,7 +58,7 @@ def frequency_response(
     UnknownName
         Another `intersample`.
     ValueError
-        A level that is no probability.
+        A level that is no probability; a frequency below 0 or above half the sample rate.
 
     Examples
     --------
@@ -73,7 +73,10 @@ def frequency_response(
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, wanted a probability between 0 and 1")
     rate = 1 / model.sample_time_s
-    frequency = np.geomspace(rate / 5000, rate / 2, POINTS) if frequency_hz is None else np.asarray(frequency_hz, float)
+    given = np.geomspace(rate / 5000, rate / 2, POINTS) if frequency_hz is None else frequency_hz
+    frequency = np.atleast_1d(np.asarray(given, float))
+    if frequency.ndim != 1 or not np.all((frequency >= 0) & (frequency <= rate / 2 * (1 + 1e-9))):
+        raise ValueError(f"frequency_hz wants numbers from 0 to half the sample rate, {rate / 2:g} Hz")
     z = np.exp(2j * np.pi * frequency * model.sample_time_s)
     left, right = _resolvents(model, z, input, output)
     transfer = left @ model.B[:, input] + model.D[output, input]

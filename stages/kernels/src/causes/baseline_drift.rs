@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::Effects;
 
-/// `y = q + s P1 + b P2 + t P3`, Legendre polynomials in the place within the record.
+/// `y = q + s P1 + b P2 + t P3`, Legendre polynomials in the place within the stretch that was learnt from; before and
+/// behind it their tangents.
 pub struct BaselineDrift;
 
 const ABOUT: About = About {
@@ -39,8 +40,11 @@ impl Cause for BaselineDrift {
     fn add(&self, values: &[f64], effects: &mut Effects) {
         let (slope, bend, twist) = (values[0], values[1], values[2]);
         effects.added.push(Arc::new(move |instant| {
-            let x = (2.0 * instant.place - 1.0).clamp(-1.0, 1.0);
-            slope * x + bend * (1.5 * x * x - 0.5) + twist * (2.5 * x * x - 1.5) * x
+            let place = 2.0 * instant.place - 1.0;
+            let x = place.clamp(-1.0, 1.0);
+            let inside = slope * x + bend * (1.5 * x * x - 0.5) + twist * (2.5 * x * x - 1.5) * x;
+            let rise = slope + 3.0 * bend * x + twist * (7.5 * x * x - 1.5);
+            inside + rise * (place - x)
         }));
     }
 

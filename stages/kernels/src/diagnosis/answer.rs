@@ -16,6 +16,11 @@ use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
 
+/// What is left that motion and input predict, over what the causes explain, as ratio of root mean squares, below which
+/// names stand whatever the noise. Why 0.02: a wrong law of one parameter leaves a tenth and more of the effect that it
+/// stands for; a right one of a real system some per cent, where noise is a ten-thousandth of the output.
+const NEGLIGIBLE: f64 = 0.02;
+
 /// What an answer is made from.
 pub(super) struct Findings<'a> {
     pub bench: &'a Bench,
@@ -73,7 +78,9 @@ impl Findings<'_> {
     }
 
     pub(super) fn systematic(&self) -> bool {
-        self.misfit.is_systematic(self.options.tolerated_misfit) || self.lacking().is_some()
+        let left = self.choice.ladder.last().map_or(0.0, |last| last.fit.loss) * self.misfit.share();
+        let small = left < NEGLIGIBLE * NEGLIGIBLE * self.explained();
+        self.misfit.is_systematic(self.options.tolerated_misfit) && !small || self.lacking().is_some()
     }
 
     /// What the causes take of the squared residual, together.
@@ -316,9 +323,12 @@ impl Findings<'_> {
                 "motion and input predict another {share:.1} % of the squared residual ({:.1} standard errors), {}",
                 self.misfit.significance,
                 if verdict == Verdict::Unexplained && self.systematic() {
-                    "more than is tolerated"
+                    format!(
+                        "{:.2} of the root mean square of what they do not predict: more than `tolerated_misfit` = {} allows",
+                        self.misfit.ratio, self.options.tolerated_misfit
+                    )
                 } else {
-                    "which is tolerated"
+                    "which is tolerated".to_owned()
                 }
             ));
         }

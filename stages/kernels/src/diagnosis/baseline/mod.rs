@@ -31,9 +31,10 @@ pub(super) struct Adequacy {
 /// A structure is extended where its error is at most so many times that of the best linear model, or where it is the
 /// simplest of a free decay.
 ///
-/// Why: exponentials beside one another follow a frequency that moves with the amplitude, so that the best linear model
-/// of one nonlinear mode has several; one oscillator with the right causes beats them all.
-const CLOSE: f64 = 5.0;
+/// Why: exponentials beside one another follow a frequency or a damping that moves with the amplitude, so that the best
+/// linear model of one nonlinear mode has several and leaves a tenth of what one leaves; one oscillator with the right
+/// causes beats them all. Without a mode that is there a hundred times as much is left.
+const CLOSE: f64 = 20.0;
 /// Share of the signal beyond which what the best linear model leaves is as good as all of it.
 const NOTHING: f64 = 0.9;
 

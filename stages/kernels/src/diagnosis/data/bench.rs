@@ -44,6 +44,8 @@ pub struct Bench {
     records: usize,
     /// Values that are there.
     pub count: usize,
+    /// Record of each stretch that is learnt from, and the time of its first sample, s: there the causes' place is 0.
+    origins: Arc<Vec<(usize, f64)>>,
     /// Length that the causes' place within a record is counted in, s.
     reference_s: f64,
     /// Input of each record by its course between samples; none where there is no input.
@@ -124,6 +126,7 @@ impl Bench {
             input_scale,
             driven,
             records: records.len(),
+            origins: Arc::new(stretches.iter().map(|s| (s.record, s.first as f64 * interval_s)).collect()),
             reference_s: longest as f64 * interval_s,
             inputs: Arc::new(if driven { records.iter().map(fine).collect() } else { Vec::new() }),
             steps,
@@ -265,15 +268,25 @@ impl Bench {
         effects: &'a Effects,
         nodes: Option<&'a [f64]>,
     ) -> Run<'a> {
+        let begin_s = stretch.first as f64 * self.interval_s;
         let span = Span {
             interval_s: self.interval_s,
-            begin_s: stretch.first as f64 * self.interval_s,
+            begin_s,
+            origin_s: self.origin_s(stretch.record, begin_s),
             reference_s: self.reference_s,
             record: stretch.record,
             steps: self.steps,
             samples: stretch.samples(),
         };
         Run { dynamics: self.dynamics(model, stretch, effects), state, nodes, effects, span }
+    }
+
+    /// Where the place of a stretch is counted from: the last stretch of its record that was learnt from and does not begin
+    /// behind it, else the stretch itself.
+    fn origin_s(&self, record: usize, begin_s: f64) -> f64 {
+        let within = 0.5 * self.interval_s;
+        let before = self.origins.iter().filter(|(own, origin)| *own == record && *origin <= begin_s + within);
+        before.map(|(_, origin)| *origin).reduce(f64::max).unwrap_or(begin_s)
     }
 
     /// A model's dynamics as they are in the record of a stretch.

@@ -17,7 +17,8 @@ pub struct Span {
     pub interval_s: f64,
     /// Time of its first sample since its record's, s.
     pub begin_s: f64,
-    /// Length that the causes' place in the record is counted in, s.
+    /// Where the causes' place in the record is counted from, since its first sample, and the length that it is counted in, s.
+    pub origin_s: f64,
     pub reference_s: f64,
     /// Number of the record.
     pub record: usize,
@@ -40,7 +41,7 @@ impl Span {
         }
         let instant = Instant {
             record: self.record,
-            place: k as f64 * self.interval_s / self.reference_s.max(f64::MIN_POSITIVE),
+            place: (self.time_s(k) - self.origin_s) / self.reference_s.max(f64::MIN_POSITIVE),
             time_s: self.time_s(k),
             piezo_m: 0.0,
         };

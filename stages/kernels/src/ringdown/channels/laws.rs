@@ -207,8 +207,9 @@ impl<'a> LawFit<'a> {
         }
     }
 
-    /// Lines that follow no law and are no linear modes either, for they move from part to part or need more exponentials
-    /// than modes share a line.
+    /// Lines that follow no law and are no linear modes either, for they move from part to part, need more exponentials
+    /// than modes share a line, or are not even described by exponentials of which the second strongest does not beat with
+    /// the strongest.
     fn moving_without_law(&self, linear: &FollowedDecay, found: &Lines) -> Vec<OneLine> {
         let energy = energies(self.all);
         let moves = |own: &[usize]| {
@@ -221,8 +222,12 @@ impl<'a> LawFit<'a> {
             if line.follows != Follows::None || law(line).is_some() {
                 continue;
             }
-            let strongest = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]));
-            if let Some(main) = strongest.filter(|_| moves(own) || own.len() > MOST_IN_ONE_LINE) {
+            let mut order = own.clone();
+            order.sort_by(|a, b| energy[*b].total_cmp(&energy[*a]));
+            let pole = |j: usize| self.all.poles[j];
+            let overlap = order.get(1).is_some_and(|&next| apart(pole(order[0]), pole(next)) < 1.0);
+            let undescribed = overlap && line.lack.factor >= LARGEST_LACK;
+            if let Some(&main) = order.first().filter(|_| moves(own) || own.len() > MOST_IN_ONE_LINE || undescribed) {
                 refuted.push(OneLine { main, own: own.clone() });
             }
         }
@@ -256,7 +261,10 @@ impl<'a> LawFit<'a> {
         }
         match line.follows {
             Follows::Exponentials(count) if line.lack.factor <= 1.0 && count == own.len() => {
-                own.iter().for_each(|&j| rows.undrop_companion(j));
+                let energy = energies(self.all);
+                let main = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]))?;
+                let beats = |j: &&usize| apart(self.all.poles[main], self.all.poles[**j]) >= 1.0;
+                own.iter().filter(beats).for_each(|&j| rows.undrop_companion(j));
                 rows.of_poles(own).first().copied()
             }
             Follows::Linear if has_row.len() == 1 && (self.by_chance(line, found) || !line.modes.iter().all(rings)) => {
@@ -342,6 +350,11 @@ fn left_by(other: &FollowedMode, main: &FollowedMode) -> Option<f64> {
 
 /// Modal assurance criterion of one shape, at least.
 const ONE_SHAPE: f64 = 0.95;
+
+/// Distance of two lines in half widths of the narrower: below one they do not beat before either is gone.
+fn apart(a: c64, b: c64) -> f64 {
+    (a.im - b.im).abs() / a.re.abs().min(b.re.abs())
+}
 
 /// One turn more or less within the longest record, rad/s.
 pub(super) fn resolution(events: &[Vec<&[f64]>], interval_s: f64) -> f64 {

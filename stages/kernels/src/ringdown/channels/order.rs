@@ -111,7 +111,7 @@ pub(super) fn explained(
     if step.fitted.poles.0.len() < 2 && silent() {
         return None;
     }
-    if ladder.leaves_a_mode(&step) {
+    if ladder.further(&step).is_some() {
         return None;
     }
     ChannelRingdown::of(&records, &ladder.refined(step), tried).ok()
@@ -322,6 +322,10 @@ impl Ladder<'_> {
             return Err(ModelError::Degenerate("no oscillation above the noise"));
         }
         let step = best.unwrap_or(current);
+        if least > 0 {
+            let more = |gain| OrderTried { modes: least + 1, gain, kept: false };
+            seen.extend(self.further(&step).map(more));
+        }
         Ok((if least == 0 { self.pruned(step, &mut seen) } else { step }, seen))
     }
 
@@ -335,7 +339,7 @@ impl Ladder<'_> {
         let start = shift_invariant(self.records, &noise, modes, self.options.least_quality_factor)?;
         let step = self.settled(self.weighed(&start, &noise));
         let certain = |j: usize| !self.by_chance(step.fitted.projection.strength(j) / CERTAIN, 1);
-        if !(0..modes).all(certain) || self.leaves_a_mode(&step) {
+        if !(0..modes).all(certain) || self.further(&step).is_some() {
             return None;
         }
         let none = self.mark(&self.weighed(&Poles(Vec::new()), &noise));
@@ -343,11 +347,11 @@ impl Ladder<'_> {
         Some((step, vec![OrderTried { modes, gain, kept: true }]))
     }
 
-    /// Whether a mode more explains more than chance does.
-    fn leaves_a_mode(&self, step: &Step) -> bool {
-        self.next(step, None, false).is_some_and(|more| {
-            more.last_pole().is_some_and(|place| !self.by_chance(self.gain(&self.mark(step), &more, &[place]), 1))
-        })
+    /// Gain of a mode more; none where it explains no more than chance does.
+    fn further(&self, step: &Step) -> Option<f64> {
+        let more = self.next(step, None, false)?;
+        let gain = self.gain(&self.mark(step), &more, &[more.last_pole()?]);
+        (!self.by_chance(gain, 1)).then_some(gain)
     }
 
     /// The best fit with a mode more; none where nothing is left that may be one, unless one is `wanted`.

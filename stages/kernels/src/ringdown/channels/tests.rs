@@ -332,6 +332,9 @@ fn a_given_number_of_modes_is_what_the_search_finds() {
         let [given, found] = [given, ChannelOptions::default()]
             .map(|options| fit_channels(&events, &[], INTERVAL_S, &options).expect("a fit"));
         assert_eq!((found.poles.len(), given.seen.len()), (2, 1), "seed {seed}: {:?}", found.seen);
+        let fewer = ChannelOptions { modes: ModesWanted::Fixed(1), ..ChannelOptions::default() };
+        let fewer = fit_channels(&events, &[], INTERVAL_S, &fewer).expect("a fit").seen;
+        assert!(fewer.last().is_some_and(|tried| tried.modes == 2 && !tried.kept), "seed {seed}: {fewer:?}");
         for (a, b) in given.modes().iter().zip(found.modes()) {
             let off = (a.frequency_hz.value - b.frequency_hz.value).abs() / b.frequency_hz.std;
             // each search ends a thousandth of a standard error from the best

@@ -141,7 +141,8 @@ impl ThermalFit {
 /// to three places that stand out of a running median. A bin is a line if chance makes such a value with probability
 /// `line_false_alarm` over the number of bins; it goes with the bins that the window spreads it to, and the fit is
 /// repeated until the set of lines stays. Among the starts the one with the smallest deviance wins, each line counted
-/// at the threshold, so that a line is never the resonance unless nothing else is. 1/f noise stays if it gains more
+/// at the threshold, so that a line is never the resonance unless nothing else is; of several resonances wider than a bin
+/// the one of most variance, the others set aside. 1/f noise stays if it gains more
 /// than 5.41 (chi-square of one degree at its bound, 1 %).
 ///
 /// # Shapes
@@ -234,6 +235,10 @@ fn fit_through(
                 Err(error) => failure = error,
             }
         }
+        // of several modes the one that moves most, whichever accounts for more bins
+        if let Some(most) = strongest_of_several(&settled) {
+            return Ok(settled.swap_remove(most));
+        }
         // narrower than a hundredth of a bin: a line, unless nothing else is found
         let score = |s: &Settled| (s.parameters.is_line(likelihood.bin_hz), s.deviance);
         settled
@@ -264,6 +269,29 @@ fn fit_through(
     Ok((report(&likelihood, &rule, data, &settled, gain), settled.deviance))
 }
 
+/// Bins above half its height that a line does not have.
+const WIDER_BINS: f64 = 2.5;
+/// Least quality factor of a mode beside others: a broader hump may be a colour of the noise.
+const LEAST_QUALITY: f64 = 2.0;
+/// Its density at the peak over that of the white noise, at least.
+const STANDS_OUT: f64 = 2.0;
+
+/// The resonance of most variance where there are several, each wider than a line and above the noise; none of one.
+fn strongest_of_several(settled: &[Settled]) -> Option<usize> {
+    let stands = |s: &Settled| {
+        let [variance, frequency, quality, white] = std::array::from_fn(|i| s.parameters.value(i));
+        let peak = 2.0 / PI * variance * quality / frequency;
+        s.resolved && quality > LEAST_QUALITY && peak > STANDS_OUT * white
+    };
+    let several: Vec<usize> = (0..settled.len()).filter(|&k| stands(&settled[k])).collect();
+    let [first, .., last] = several[..] else { return None };
+    let place = |k: usize| (settled[k].parameters.frequency_hz(), settled[k].parameters.value(2));
+    let ((a, qa), (b, qb)) = (place(first), place(last));
+    let apart = (a - b).abs() > a / qa + b / qb;
+    let variance = |k: &usize| settled[*k].parameters.value(0);
+    several.into_iter().max_by(|i, k| variance(i).total_cmp(&variance(k))).filter(|_| apart)
+}
+
 /// 1 % of a chi-square of one degree that is cut off at its bound half of the time.
 const FLICKER_GAIN: f64 = 5.41;
 
@@ -271,6 +299,8 @@ struct Settled {
     parameters: Parameters,
     used: Vec<bool>,
     deviance: f64,
+    /// Whether it is as wide as a bin: a line is not.
+    resolved: bool,
 }
 
 /// Fits, sets lines aside, and fits again until the set of lines stays.
@@ -279,6 +309,13 @@ fn settle(likelihood: &Likelihood<'_>, rule: &LineRule, start: Parameters) -> Re
     let mut parameters = start;
     // the first fit leaves out what towers over its neighbours; it comes back if the fit explains it
     let mut used = flagged(likelihood.data.density, &running_median(likelihood.data.density, 9), &rule.times(4.0));
+    // but not the resonance that it begins with, where that is wider than a line
+    let (centre_hz, width_hz) = (start.frequency_hz(), start.frequency_hz() / start.value(2));
+    if width_hz > WIDER_BINS * likelihood.bin_hz {
+        let own = |f: &f64| (f - centre_hz).abs() < 2.0 * width_hz;
+        let inside = likelihood.data.frequency_hz.iter().zip(&mut used).filter(|(f, _)| own(f));
+        inside.for_each(|(_, used)| *used = true);
+    }
     for _ in 0..ROUNDS {
         parameters = likelihood.maximise(parameters, &used)?;
         let next = flagged(likelihood.data.density, &likelihood.density(&parameters), rule);
@@ -294,7 +331,8 @@ fn settle(likelihood: &Likelihood<'_>, rule: &LineRule, start: Parameters) -> Re
     }
     parameters = likelihood.maximise(parameters, &used)?;
     let deviance = likelihood.capped_deviance(&parameters, &used, rule.threshold);
-    Ok(Settled { parameters, used, deviance })
+    let resolved = parameters.value(1) / parameters.value(2) > likelihood.bin_hz;
+    Ok(Settled { parameters, used, deviance, resolved })
 }
 
 fn report(

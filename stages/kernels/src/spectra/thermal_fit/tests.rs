@@ -130,6 +130,25 @@ fn oscillator(f0: f64, quality: f64, rate: f64, samples: usize, seed: u64) -> Ve
         .collect()
 }
 
+/// A lever's first mode has most of the variance and few bins, its second one more bins.
+#[test]
+fn of_several_modes_the_one_that_moves_most_is_fitted() {
+    for seed in 0..20 {
+        let first = [std::f64::consts::FRAC_PI_2 * 800.2 / 200.0 * 60.0, 800.2, 200.0, 1.0, 0.0];
+        let (f, p) = spectrum(first, 2000, SeenThrough::Rectangular, 2000 + seed);
+        let second = [std::f64::consts::FRAC_PI_2 * 1900.4 / 100.0 * 8.0, 1900.4, 100.0, 1e-9, 0.0];
+        let (_, other) = spectrum(second, 2000, SeenThrough::Rectangular, 3000 + seed);
+        let both: Vec<f64> = p.iter().zip(other).map(|(p, other)| p + other).collect();
+        let found = fit(&f, &both, SeenThrough::Rectangular);
+        let off = (found.frequency_hz.value - first[1]) / found.frequency_hz.std;
+        assert!(off.abs() < 4.5, "seed {seed}: {:?}, {:?}", found.frequency_hz, found.quality_factor);
+        assert!(
+            (found.quality_factor.value / 200.0 - 1.0).abs() < 5.0 * found.quality_factor.std / 200.0,
+            "seed {seed}"
+        );
+    }
+}
+
 #[test]
 fn lines_are_set_aside_and_false_alarms_are_as_rare_as_stated() {
     let truth = [std::f64::consts::FRAC_PI_2 * 140.0 * 20.0, 1400.3, 10.0, 1.0, 0.0];
