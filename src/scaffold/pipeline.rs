@@ -158,7 +158,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
                 let usual = segment_samples(choice.channels[0].samples);
                 let (stretches, samples) = match choice.free_stretches {
-                    true => ("free", usual.min(MOST_FREE_SAMPLES)),
+                    true => ("free", (2 * usual).min(MOST_FREE_SAMPLES)),
                     false => ("all", choice.segment_samples.unwrap_or(usual)),
                 };
                 text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"{stretches}\" }}\n"));
@@ -177,8 +177,9 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
     if points { points::in_place_of_one(&text, source, choice, wanted, folder) } else { Ok(text) }
 }
 
-/// Samples of a segment of free stretches, at most: as the stage has it by default.
-const MOST_FREE_SAMPLES: usize = 16_384;
+/// Samples of a segment of free stretches, at most: a lever's first mode, 1 % of the rate and of Q 40, is sixteen bins wide
+/// then; in a quarter of that a line and a mode are hard to tell apart.
+const MOST_FREE_SAMPLES: usize = 65_536;
 
 /// The `params` of the stage `records`.
 fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {

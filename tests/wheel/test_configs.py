@@ -28,8 +28,8 @@ def stored(path):
     found = {}
 
     def keep(name, item):
-        # beside the stages stand when and where it was made
-        if name.count("/") < 2:
+        # beside the stages stand when, where and on how many threads it was made
+        if name.count("/") < 2 or name.startswith("entry/run/"):
             return
         for key, value in item.attrs.items():
             if np.issubdtype(np.asarray(value).dtype, np.number):

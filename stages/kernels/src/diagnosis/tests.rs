@@ -243,7 +243,8 @@ fn two_hidden_causes_are_both_named() {
     assert!(right as f64 >= 0.75 * count as f64 - 1.0);
 }
 
-/// A drift is learnt over three quarters of a record; the last one is told from it, and not from its beginning again.
+/// A drift is learnt over three quarters of a record; what it is in the last one follows from there, and does not begin
+/// again.
 #[test]
 fn a_drift_goes_on_where_it_was_not_learnt() {
     for seed in 0..4 {

@@ -118,11 +118,9 @@ impl Turning {
         let (whole, rest) = out.as_chunks_mut::<LANES>();
         for part in whole {
             let mut largest = 0.0f64;
-            for lane in 0..LANES {
-                let (re, im) = (self.re[lane], self.im[lane]);
-                part[lane] += re;
-                self.re[lane] = re * step.re - im * step.im;
-                self.im[lane] = re * step.im + im * step.re;
+            for ((y, re), im) in part.iter_mut().zip(&mut self.re).zip(&mut self.im) {
+                *y += *re;
+                (*re, *im) = (*re * step.re - *im * step.im, *re * step.im + *im * step.re);
                 largest = largest.max(re.abs() + im.abs());
             }
             // below every rounding nothing is left to add, and denormal numbers are slow
