@@ -56,11 +56,12 @@ fn contents(registry: &Registry) -> String {
 }
 
 /// The tutorials, in reading order.
-const TUTORIALS: [(&str, &str); 5] = [
+const TUTORIALS: [(&str, &str); 6] = [
     ("The paper in ten minutes", "paper.md"),
     ("My own recordings", "recordings.md"),
     ("A hammer's hit", "vibration.md"),
     ("Find what my model misses", "diagnosis.md"),
+    ("From Python", "python.md"),
     ("My own stage", "stage.md"),
 ];
 
