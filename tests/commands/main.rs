@@ -13,6 +13,7 @@ mod command_line;
 mod diagnose;
 mod errors;
 mod example;
+mod kinds;
 mod measurement;
 mod plugins;
 mod provenance;

@@ -150,15 +150,21 @@ def ringdown(
     )
     said = [*said, *more]
     artifacts.warn(said)
-    shapes = artifacts.array(fitted["shapes"])
-    by_name = {"channel": shapes.attrs.pop("channels").split("\n")}
-    return Ringdown(
-        modes=artifacts.table(fitted["modes"]),
-        shapes=shapes.assign_coords(by_name),
-        hits=artifacts.table(fitted["hits"]),
-        course=artifacts.table(fitted["course"]),
-        residuals=artifacts.array(fitted["fit"]).assign_coords(by_name),
+    found: Ringdown = Ringdown._made_when_asked(
+        {
+            "modes": lambda: artifacts.table(fitted["modes"]),
+            "shapes": lambda: _shapes(fitted),
+            "hits": lambda: artifacts.table(fitted["hits"]),
+            "course": lambda: artifacts.table(fitted["course"]),
+            "residuals": lambda: artifacts.array(fitted["fit"]).assign_coords(channel=_shapes(fitted)["channel"]),
+            "details": lambda: artifacts.document(fitted["summary"]),
+        },
         events=events,
         warnings=tuple(said),
-        details=artifacts.document(fitted["summary"]),
     )
+    return found
+
+
+def _shapes(fitted: dict[str, Any]) -> xr.Dataset:
+    shapes = artifacts.array(fitted["shapes"])
+    return shapes.assign_coords(channel=shapes.attrs.pop("channels").split("\n"))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
-from typing import Any, ClassVar
+from threading import RLock
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 import xarray as xr
 
 from .numbers import MODE_HEADS, html_table, mode_rows, text_table
+
+_MAKING = RLock()
+"""Held while a field is made: threads that ask for it at once get one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -35,6 +40,41 @@ class Estimate:
     """What is not alright, in the program's words."""
     details: dict[str, Any] = field(default_factory=dict)
     """The stage's summary: what `afmid show RESULT STAGE --json` prints."""
+
+    @classmethod
+    def _made_when_asked(cls, later: Mapping[str, Callable[[], Any]], **known: Any) -> Any:
+        """A result of which some fields are made when they are first asked for: a loop over many records wants few.
+
+        >>> class Gain(Estimate):
+        ...     value: float
+        >>> gain = Gain._made_when_asked({"value": lambda: 2.0}, warnings=(), details={})
+        >>> gain.value
+        2.0
+        """
+        made = object.__new__(cls)
+        made.__dict__.update(known, _later=dict(later))
+        return made
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            with _MAKING:
+                if name not in self.__dict__:
+                    later = self.__dict__.get("_later", {})
+                    if name not in later:
+                        raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}", name=name, obj=self)
+                    self.__dict__[name] = later[name]()
+                    del later[name]
+                return self.__dict__[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that it has, made: what makes it cannot be pickled."""
+        for name in list(self.__dict__.get("_later", ())):
+            getattr(self, name)
+        return {name: value for name, value in self.__dict__.items() if name != "_later"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
 
     def _rows(self) -> list[list[str]]:
         """The table's rows, a cell under each head."""

@@ -19,8 +19,17 @@ pub fn hann(samples: usize) -> Vec<f64> {
 /// # Source
 /// A. M. Sykulski, S. C. Olhede, A. P. Guillaumin, J. M. Lilly, J. J. Early, Biometrika 106 (2019) 251.
 pub(super) fn expected_parts(noise: &RingdownNoise, interval_s: f64, lag_weights: &[f64]) -> Vec<Vec<f64>> {
+    expected_parts_by(&RealTransform::new(lag_weights.len()), noise, interval_s, lag_weights)
+}
+
+/// [`expected_parts`] by a transform of as many samples.
+pub(super) fn expected_parts_by(
+    plan: &RealTransform,
+    noise: &RingdownNoise,
+    interval_s: f64,
+    lag_weights: &[f64],
+) -> Vec<Vec<f64>> {
     let n = lag_weights.len();
-    let plan = RealTransform::new(n);
     (0..noise.parts())
         .into_par_iter()
         .map(|part| {

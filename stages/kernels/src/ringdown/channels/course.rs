@@ -158,12 +158,13 @@ pub fn follow_fitted(
     let fixed = matches!(options.modes, ModesWanted::Fixed(_)) || !options.start.is_empty();
     let records = LawFit { all, events, interval_s, options };
     let linear = |one_line: &[OneLine]| follow_linear(&records, free, (fixed, motion == Motion::Whole), one_line);
-    if fixed || motion != Motion::Laws {
+    if fixed || motion == Motion::Whole {
         return linear(&[]);
     }
-    let found = match linear(&[]) {
-        Ok(found) => follow_laws(&records, found, &linear)?,
-        Err(error) => oscillations(&records).ok_or(error)?,
+    let found = match (linear(&[]), motion) {
+        (Ok(found), Motion::Laws) => follow_laws(&records, found, &linear)?,
+        (Ok(found), _) => return Ok(found),
+        (Err(error), _) => oscillations(&records).ok_or(error)?,
     };
     Ok(found.without_sidebands(&records))
 }

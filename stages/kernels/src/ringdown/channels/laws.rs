@@ -6,7 +6,7 @@ use faer::c64;
 
 use super::companions::{DETERMINED, Dropped, DroppedMode, broad, energies};
 use super::course::{FollowedDecay, nearest};
-use super::lines::{Lines, near};
+use super::lines::{Lines, near, paths};
 use super::options::ChannelOptions;
 use super::result::ChannelRingdown;
 use super::rows::Rows;
@@ -30,7 +30,10 @@ const FIRST_PARTS: [f64; 3] = [0.6, 0.35, 0.2];
 
 /// Half widths (of both together) within which lines are fitted together: what one lacks, the others explain.
 pub(super) const TOGETHER: f64 = 6.0;
-/// The same within which two modes may be one that moves.
+/// Turns more or less within the longest record up to which lines are fitted together: a decay that ends within it, as under
+/// friction, is a series of lines that do not die away, one and a half turns apart.
+const BESIDE: f64 = 2.0;
+/// Half widths within which two modes may be one that moves.
 const ONE_LINE: f64 = 2.5;
 /// Relative distance from a multiple of another line up to which a line is looked at with it.
 const NEAR_MULTIPLE: f64 = 0.02;
@@ -98,10 +101,8 @@ pub(super) fn follow_laws(
         rows.widen_line(&line.own);
     }
     records.rows(&found, &mut rows);
-    for (line, part) in refuted.iter().zip(&parts) {
-        let Some(FirstPart { line: followed, share }) = part else { continue };
-        let tag = law(followed).and_then(|mode| records.row_of_law(followed, mode, &line.own, &mut rows));
-        tag.into_iter().for_each(|tag| rows.holds_in(tag, *share));
+    for (line, part) in refuted.iter().zip(parts) {
+        records.row_of_first_part(line, part, &mut rows);
     }
     for course in rows.moving() {
         rows.widen(course.mode, 0.5 * (course.last.pole() - course.first.pole()));
@@ -138,6 +139,11 @@ pub(super) fn oscillations(records: &LawFit<'_>) -> Option<FollowedDecay> {
     let found = if given.is_empty() { None } else { Lines::of(records, &given, &[]).ok() }?;
     let mut rows = Rows::of(empty, all);
     records.rows(&found, &mut rows);
+    if rows.is_empty() {
+        paths(records, &given)
+            .iter()
+            .for_each(|line| records.row_of_first_part(line, records.first_part(line), &mut rows));
+    }
     let followed = rows.finished(found.fit.residuals);
     (!followed.fit.poles.is_empty()).then_some(followed)
 }
@@ -164,7 +170,7 @@ impl<'a> LawFit<'a> {
         loop {
             let beside = |j: &usize| {
                 !suspect.contains(j)
-                    && suspect.iter().any(|&other| near(poles[*j], poles[other], TOGETHER, self.resolution()))
+                    && suspect.iter().any(|&other| near(poles[*j], poles[other], TOGETHER, BESIDE * self.resolution()))
             };
             let more: Vec<usize> = others.iter().copied().filter(beside).collect();
             if more.is_empty() {
@@ -232,6 +238,13 @@ impl<'a> LawFit<'a> {
             }
         }
         refuted
+    }
+
+    /// The row of a line whose laws hold in a first part of the decays.
+    fn row_of_first_part(&self, line: &OneLine, part: Option<FirstPart>, rows: &mut Rows<'_>) {
+        let Some(FirstPart { line: followed, share }) = part else { return };
+        let tag = law(&followed).and_then(|mode| self.row_of_law(&followed, mode, &line.own, rows));
+        tag.into_iter().for_each(|tag| rows.holds_in(tag, share));
     }
 
     /// The line in the longest first part of the decays that laws hold in, down to noise; none of damping that laws are no

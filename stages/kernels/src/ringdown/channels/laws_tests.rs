@@ -277,3 +277,43 @@ fn a_close_pair_in_much_noise_is_no_mode_that_moves() {
     // where noise makes one law as good as two modes it may be taken: once in a hundred
     assert!(moving <= 1 && off <= 2, "{moving} {off}");
 }
+
+/// Dry friction stops the motion within the record: exponentials make such a decay of many lines that do not die away, and
+/// it is one mode, whose amplitude falls by `2 w F / pi` a second beside its loss (F: deflection that friction holds).
+#[test]
+fn decays_that_friction_stops_are_one_mode() {
+    let (w, damping, interval_s) = (TAU * 0.9125, 0.0115, 1.0 / 60.0);
+    for (seed, friction) in [(1, 0.004), (2, 0.006), (3, 0.01)] {
+        let force = |x: f64, v: f64| -w * w * (x + friction * (v / w / 2e-3).tanh()) - 2.0 * damping * w * v;
+        let hit = |amplitude: f64, samples: usize| -> Vec<Vec<f64>> {
+            let h = interval_s / 24.0;
+            let (mut x, mut v) = (amplitude, 0.0);
+            let row = (0..samples).map(|_| {
+                let now = x;
+                for _ in 0..24 {
+                    // the speed half a step ahead
+                    let half = v + 0.5 * h * force(x, v);
+                    x += h * half;
+                    v = half + 0.5 * h * force(x, half);
+                }
+                now
+            });
+            vec![row.collect()]
+        };
+        let rows = [hit(0.74, 1500), hit(0.97, 1750), hit(-0.93, 1740), hit(0.5, 1200)];
+        let rows: Vec<Vec<f64>> = rows.into_iter().flatten().collect();
+        let found = followed(&hits(&[(rows, &[1.0])], 0.00145, seed), interval_s).unwrap();
+        let [mode] = &found.fit.modes()[..] else { panic!("{friction}: {:?}", found.fit.modes()) };
+        let truth_hz = w / TAU;
+        // five standard errors: one number in two millions beyond; a step of 1/1500 of a period shifts by a millionth
+        assert!(
+            (mode.frequency_hz.value - truth_hz).abs() < 5.0 * mode.frequency_hz.std + 1e-5,
+            "{friction}: {mode:?}"
+        );
+        let along = found.along.first().unwrap_or_else(|| panic!("{friction}: no laws"));
+        let low = along.laws.course[0];
+        let truth = damping + 2.0 / PI * friction / low.amplitude;
+        // where friction is rounded it is a tenth less than dry
+        assert!((low.damping_ratio.value / truth - 1.0).abs() < 0.1, "{friction}: {low:?}, {truth}");
+    }
+}

@@ -2,10 +2,10 @@
 
 use faer::c64;
 
-use super::companions::energies;
 use super::course::MOVES;
-use super::laws::{LARGEST_LACK, LawFit, dies};
+use super::laws::{LARGEST_LACK, LawFit, OneLine, dies};
 use super::levels::density;
+use super::result::{ChannelRingdown, RecordFit};
 use crate::model::ModelError;
 use crate::ringdown::moving::{self, Exponential, FollowedLine, Follows, Line, Moving, follow_moving};
 
@@ -49,7 +49,7 @@ impl Lines {
         if first.as_ref().is_ok_and(holds) {
             return first;
         }
-        let energy = energies(all);
+        let energy = within(all, records);
         let mean = |own: Vec<usize>| {
             let of_row: Vec<c64> = rows.iter().filter(|(_, j)| own.contains(j)).map(|(pole, _)| *pole).collect();
             let weight: f64 = own.iter().map(|&j| energy[j]).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -59,7 +59,7 @@ impl Lines {
             };
             (Line { poles: vec![Exponential { rate_per_s: -pole.re, turn_rad_per_s: pole.im }] }, own)
         };
-        let paths = one_path(&all.poles, given).into_iter().map(mean).collect();
+        let paths = one_path(&all.poles, given, records.resolution()).into_iter().map(mean).collect();
         let noise =
             first.as_ref().map_or_else(|_| left.noise_variance.clone(), |found| found.fit.noise_variance.clone());
         match (first, left.fitted(paths, noise)) {
@@ -125,8 +125,34 @@ impl Left {
     }
 }
 
-/// Exponentials that may be one path each, by number: neighbours within the width of the broadest of either.
-fn one_path(poles: &[c64], given: &[usize]) -> Vec<Vec<usize>> {
+/// The paths that these exponentials may be, each with the one that has the most energy in the records.
+pub(super) fn paths(records: &LawFit<'_>, given: &[usize]) -> Vec<OneLine> {
+    let energy = within(records.all, records);
+    let of = |own: Vec<usize>| {
+        let main = own.iter().copied().max_by(|a, b| energy[*a].total_cmp(&energy[*b]))?;
+        Some(OneLine { main, own })
+    };
+    one_path(&records.all.poles, given, records.resolution()).into_iter().filter_map(of).collect()
+}
+
+/// Energy of each exponential within the records, in variances of the noise: that of one that hardly dies away is finite.
+fn within(all: &ChannelRingdown, records: &LawFit<'_>) -> Vec<f64> {
+    let duration_s = |event: usize| {
+        let samples = records.events.get(event).and_then(|rows| rows.first()).map_or(0, |row| row.len());
+        samples as f64 * records.interval_s
+    };
+    let of = |(j, pole): (usize, &c64)| -> f64 {
+        let gone = |record: &RecordFit| 1.0 - (2.0 * pole.re * duration_s(record.event)).exp();
+        let energy =
+            |record: &RecordFit| record.residues[j].norm_sqr() / all.noise[record.channel].white * gone(record);
+        all.records.iter().map(energy).sum::<f64>() / -pole.re
+    };
+    all.poles.iter().enumerate().map(of).collect()
+}
+
+/// Exponentials that may be one path each, by number: neighbours within the width of the broadest of either, which is half
+/// of what the records resolve at least. A decay that ends within them, as under friction, is made of many that do not.
+fn one_path(poles: &[c64], given: &[usize], resolution: f64) -> Vec<Vec<usize>> {
     let mut paths: Vec<Vec<usize>> = Vec::new();
     let mut order = given.to_vec();
     order.sort_by(|&a, &b| poles[a].im.total_cmp(&poles[b].im));
@@ -134,7 +160,7 @@ fn one_path(poles: &[c64], given: &[usize]) -> Vec<Vec<usize>> {
         paths.push(vec![j]);
         // the newest path takes its neighbour below for as long as they touch
         while let [.., below, last] = paths.as_slice() {
-            let width = |own: &[usize]| own.iter().map(|&j| poles[j].re.abs()).fold(0.0, f64::max);
+            let width = |own: &[usize]| own.iter().map(|&j| poles[j].re.abs()).fold(0.5 * resolution, f64::max);
             let (end, begin) = (below[below.len() - 1], last[0]);
             if poles[begin].im - poles[end].im > ONE_PATH * (width(below) + width(last)) {
                 break;

@@ -12,7 +12,7 @@ use super::records::{Record, Records};
 use crate::ringdown::RingdownNoise;
 use crate::ringdown::gaps::Gaps;
 use crate::ringdown::noise_estimate::parts_of;
-use crate::ringdown::whittle::{expected_parts, hann, variances};
+use crate::ringdown::whittle::{expected_parts_by, hann, variances};
 use crate::signal::{RealTransform, summed_periodograms};
 
 /// Gain of twice the log-likelihood that wander needs: what a handful of variances that are not there yield once in a
@@ -115,8 +115,9 @@ impl<'a> NoiseModel<'a> {
         let of = |(samples, mask): (usize, &[bool])| {
             let taper = hann(samples);
             let lags = Gaps::of_mask(mask).lag_weights(&taper);
-            let parts = expected_parts(&self.parts, self.records.interval_s, &lags);
-            Expected { samples, mask: mask.to_vec(), plan: self.records.plans.of(samples), taper, parts }
+            let plan = self.records.plans.of(samples);
+            let parts = expected_parts_by(&plan, &self.parts, self.records.interval_s, &lags);
+            Expected { samples, mask: mask.to_vec(), plan, taper, parts }
         };
         patterns.into_par_iter().map(of).collect()
     }

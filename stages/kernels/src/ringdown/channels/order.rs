@@ -122,8 +122,8 @@ struct Step {
     fitted: Fitted,
     /// Under which it was fitted.
     weights: Vec<RingdownNoise>,
-    /// What it leaves.
-    noise: Vec<RingdownNoise>,
+    /// What it leaves, where it was asked for.
+    noise: OnceCell<Vec<RingdownNoise>>,
     /// Energy that each channel leaves, in its own unit; of given noise the whitened one.
     energy: Vec<f64>,
     /// Minus twice the log-likelihood under its noise, where it was asked for.
@@ -168,12 +168,13 @@ impl Ladder<'_> {
         let fitted = self.fit(start, weights, NEARLY);
         let unit = |c: usize| if self.given_noise() { 1.0 } else { weights[c].white };
         let energy = fitted.energy.iter().enumerate().map(|(c, energy)| energy * unit(c)).collect();
-        Step { fitted, weights: weights.to_vec(), noise: weights.to_vec(), energy, coloured: OnceCell::new() }
+        let noise = OnceCell::from(weights.to_vec());
+        Step { fitted, weights: weights.to_vec(), noise, energy, coloured: OnceCell::new() }
     }
 
     fn mark(&self, step: &Step) -> Mark {
         let plain = step.fitted.deviance(self.records);
-        let (poles, noise) = (step.fitted.poles.clone(), step.noise.clone());
+        let (poles, noise) = (step.fitted.poles.clone(), self.noise_of(step).to_vec());
         Mark { poles, noise, energy: step.energy.clone(), plain, coloured: step.coloured.clone() }
     }
 
@@ -184,8 +185,13 @@ impl Ladder<'_> {
         }
         let weights = rescaled(self.records, &step.fitted, &step.weights);
         let mut step = self.weighed(&step.fitted.poles, &weights);
-        step.noise = self.noise.estimated(&step.fitted, &step.weights);
+        step.noise = OnceCell::new();
         step
+    }
+
+    /// The noise that a step leaves.
+    fn noise_of<'s>(&self, step: &'s Step) -> &'s [RingdownNoise] {
+        step.noise.get_or_init(|| self.noise.estimated(&step.fitted, &step.weights))
     }
 
     /// Minus twice the log-likelihood of a fit from these poles under this noise.
@@ -202,7 +208,7 @@ impl Ladder<'_> {
         if !self.by_chance(least - plain, modes) {
             return least - plain;
         }
-        least - plain.min(*step.coloured.get_or_init(|| self.deviance(&step.fitted.poles, &step.noise)))
+        least - plain.min(*step.coloured.get_or_init(|| self.deviance(&step.fitted.poles, self.noise_of(step))))
     }
 
     /// Operations of a step of the fit under coloured noise.
@@ -242,8 +248,8 @@ impl Ladder<'_> {
     /// The same where noise is coloured: what is left of it looks like modes of a few periods. The likelihoods count too,
     /// each fit under its own noise.
     fn coloured_gain(&self, gain: f64, before: &Mark, step: &Step, modes: usize) -> f64 {
-        let coloured = !self.given_noise() && step.noise.iter().any(|noise| !noise.is_white());
-        match !coloured || self.by_chance(gain, modes) || self.operations(&step.fitted.poles) > WHITENED {
+        let beyond = || self.by_chance(gain, modes) || self.operations(&step.fitted.poles) > WHITENED;
+        match self.given_noise() || beyond() || self.noise_of(step).iter().all(RingdownNoise::is_white) {
             true => gain,
             false => gain.min(self.likelihood_gain(before, step, modes)),
         }
@@ -287,7 +293,7 @@ impl Ladder<'_> {
         let mut current = self.weighed(&Poles(Vec::new()), &self.first_noise());
         let mut needed = self.mark(&current);
         // without a mode all is noise: what that explains needs none
-        needed.noise = self.settled(self.weighed(&Poles(Vec::new()), &self.first_noise())).noise;
+        needed.noise = self.noise_of(&self.settled(self.weighed(&Poles(Vec::new()), &self.first_noise()))).to_vec();
         let mut all_noise = Some(needed.noise.clone());
         let mut seen = Vec::new();
         let mut best: Option<Step> = None;
@@ -363,9 +369,10 @@ impl Ladder<'_> {
         let least_q = self.options.least_quality_factor;
         let bank = Bank::of(self.records, &current.fitted, least_q);
         let places = |noise: &[RingdownNoise]| bank.candidates(noise, &current.fitted.poles, CANDIDATES);
-        let plain: Vec<RingdownNoise> = current.noise.iter().map(|noise| RingdownNoise::white(noise.white)).collect();
-        let mut banks = vec![places(&current.noise)];
-        if current.noise != plain {
+        let noise = self.noise_of(current);
+        let plain: Vec<RingdownNoise> = noise.iter().map(|noise| RingdownNoise::white(noise.white)).collect();
+        let mut banks = vec![places(noise)];
+        if noise != plain {
             banks.push(places(&plain));
         }
         banks.extend(other.map(places));
@@ -424,7 +431,8 @@ impl Ladder<'_> {
     /// Method: noise that is flat over each mode's line needs no whitening: least squares, each channel with the level
     /// of its noise round the modes, and errors with the level at each.
     fn refined(&self, step: Step) -> Refined {
-        let Step { mut fitted, mut noise, .. } = step;
+        let mut noise = self.noise_of(&step).to_vec();
+        let Step { mut fitted, .. } = step;
         let level =
             |noise: &RingdownNoise, s: &c64| density(noise, self.records.interval_s, s.im * self.records.interval_s);
         let even = !self.given_noise() && !self.is_coloured(&noise, &fitted.poles.0, &fitted.poles);

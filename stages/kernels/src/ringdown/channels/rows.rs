@@ -36,6 +36,10 @@ impl<'a> Rows<'a> {
         Self { followed, all, tags: (0..next).collect(), from, dropped_from, next }
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.tags.is_empty()
+    }
+
     fn place(&self, tag: usize) -> Option<usize> {
         self.tags.iter().position(|own| *own == tag)
     }

@@ -75,6 +75,10 @@ pub fn hit_systems(
     options: &ChannelOptions,
 ) -> HitSystems {
     let (joint, own) = fit_with_hits(events, free, interval_s, options).ok().unzip();
+    if let (Some(all), [event]) = (&joint, events) {
+        let longest = event.iter().map(|row| row.len()).max().unwrap_or(0);
+        return HitSystems { strongest: vec![strongest_of(all, interval_s, longest)], systems: vec![vec![0]], joint };
+    }
     let of = |hit: usize| Hit { event: &events[hit], hit, free, interval_s, options };
     let quick = |poles: &[c64]| -> Vec<Option<Alone>> {
         let alone = |hit| Alone::explained(&of(hit), poles).or_else(|| Alone::of(&of(hit)));
@@ -112,6 +116,18 @@ fn of_one(
     let (_, common, _) = strongest.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let is_one = |hit: &&OwnPoles| hit.modes.contains(common) && hit.chance * own.len() as f64 >= MOVES;
     own.iter().all(is_one).then(|| strongest.iter().map(|(_, _, mode)| Some(*mode)).collect())
+}
+
+/// The mode of a fit with the most energy.
+fn strongest_of(all: &ChannelRingdown, interval_s: f64, samples: usize) -> Option<ModeEstimate> {
+    let none: Vec<usize> = no_modes(all, interval_s, samples).ok()?.iter().map(|(j, _)| *j).collect();
+    let fit = all.without(&none);
+    Some(fit.modes()[strongest_place(&fit)?])
+}
+
+fn strongest_place(fit: &ChannelRingdown) -> Option<usize> {
+    let energies = energies(fit);
+    (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]))
 }
 
 /// Whether no two lines are near each other: together they may stand for another damping, or for a motion.
@@ -188,9 +204,8 @@ impl Alone {
     }
 
     fn with(fit: ChannelRingdown, motion: Vec<f64>) -> Option<Self> {
-        let energies = energies(&fit);
-        let strongest = (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]))?;
-        Some(Self { energy: energies[strongest], modes: fit.modes(), fit, motion, strongest })
+        let strongest = strongest_place(&fit)?;
+        Some(Self { energy: energies(&fit)[strongest], modes: fit.modes(), fit, motion, strongest })
     }
 
     fn shares_mode(&self, other: &Self, hits: usize) -> bool {
