@@ -46,7 +46,10 @@ impl Cause for CoulombFriction {
                 // rounded below a creep of this speed: a jump of the force would stall every integrator. Thermal motion
                 // rounds what acts on the mean motion: the mean of erf(v) over a normal spread of v is an erf of a
                 // wider one
-                let creep = w * ((CREEP * c).powi(2) + (ROUNDS * motion.thermal).powi(2)).sqrt();
+                let creep = match motion.thermal {
+                    0.0 => w * (CREEP * c).abs(),
+                    thermal => w * ((CREEP * c).powi(2) + (ROUNDS * thermal).powi(2)).sqrt(),
+                };
                 if c != 0.0 {
                     *a -= w * w * c * (v / creep).tanh();
                 }

@@ -3,7 +3,8 @@
 use super::{About, Cause, Identifiable, Need, Parameter, Part, Scene};
 use crate::effects::{Effects, Intersample};
 
-/// The baseline holds the input; `kind` 1: straight lines, 2: the band-limited signal.
+/// The baseline holds the input; `kind` 1: straight lines, 2: the band-limited signal, 3: straight lines between what other
+/// causes make of its samples, as a simulator or a digital controller has it.
 pub struct IntersampleCause;
 
 const ABOUT: About = About {
@@ -14,9 +15,9 @@ const ABOUT: About = About {
     parameters: &[Parameter {
         name: "kind",
         unit: "1",
-        meaning: "0 held, 1 linear, 2 band-limited",
+        meaning: "0 held, 1 linear, 2 band-limited, 3 linear behind what acts on each sample",
         low: 0.0,
-        high: 2.0,
+        high: 3.0,
     }],
     class: &["intersample"],
     resembles: "a delay of half a sample: the same at low frequencies, not near the Nyquist frequency",
@@ -31,14 +32,16 @@ impl Cause for IntersampleCause {
     }
 
     fn add(&self, values: &[f64], effects: &mut Effects) {
-        effects.intersample = match values[0].round() as i64 {
+        let kind = values[0].round() as i64;
+        effects.intersample = match kind {
             0 => effects.intersample,
-            1 => Some(Intersample::Linear),
-            _ => Some(Intersample::BandLimited),
+            2 => Some(Intersample::BandLimited),
+            _ => Some(Intersample::Linear),
         };
+        effects.by_sample |= kind == 3;
     }
 
     fn trials(&self, _scene: &Scene) -> Vec<Vec<f64>> {
-        vec![vec![1.0], vec![2.0]]
+        vec![vec![1.0], vec![2.0], vec![3.0]]
     }
 }

@@ -16,11 +16,6 @@ use super::verdict::{
     BaselineSummary, DiagnosedMode, Diagnosis, Gain, NamedCause, Rung, RunnerUp, Validation, Value, Verdict,
 };
 
-/// What is left that motion and input predict, over what the causes explain, as ratio of root mean squares, below which
-/// names stand whatever the noise. Why 0.02: a wrong law of one parameter leaves a tenth and more of the effect that it
-/// stands for; a right one of a real system some per cent, where noise is a ten-thousandth of the output.
-const NEGLIGIBLE: f64 = 0.02;
-
 /// What an answer is made from.
 pub(super) struct Findings<'a> {
     pub bench: &'a Bench,
@@ -78,22 +73,14 @@ impl Findings<'_> {
     }
 
     pub(super) fn systematic(&self) -> bool {
-        let left = self.choice.ladder.last().map_or(0.0, |last| last.fit.loss) * self.misfit.share();
-        let small = left < NEGLIGIBLE * NEGLIGIBLE * self.explained();
-        self.misfit.is_systematic(self.options.tolerated_misfit) && !small || self.lacking().is_some()
-    }
-
-    /// What the causes take of the squared residual, together.
-    fn explained(&self) -> f64 {
-        let ends = self.choice.ladder.first().zip(self.choice.ladder.last());
-        ends.map_or(0.0, |(first, last)| (first.fit.loss - last.fit.loss).max(0.0))
+        self.choice.lacks(&self.misfit, self.options.tolerated_misfit) || self.lacking().is_some()
     }
 
     /// A law that is lacking to a degree that no name stands beside it.
     fn lacking(&self) -> Option<&UnnamedLaw> {
         let last = &self.choice.ladder.last()?.fit;
-        let least =
-            (self.options.tolerated_law.powi(2) * self.explained()).max(2.0 * self.options.least_gain * last.loss);
+        let least = (self.options.tolerated_law.powi(2) * self.choice.explained())
+            .max(2.0 * self.options.least_gain * last.loss);
         self.unnamed.as_ref().filter(|law| law.gain > least || law.beats(self.bench, last))
     }
 
@@ -284,7 +271,7 @@ impl Findings<'_> {
                  such a law"
             );
         }
-        let explained = match self.explained() {
+        let explained = match self.choice.explained() {
             0.0 => String::new(),
             explained => format!(", {:.1} % of what all causes take together", 100.0 * law.gain / explained),
         };
@@ -322,11 +309,13 @@ impl Findings<'_> {
             lines.push(format!(
                 "motion and input predict another {share:.1} % of the squared residual ({:.1} standard errors), {}",
                 self.misfit.significance,
-                if verdict == Verdict::Unexplained && self.systematic() {
+                if self.choice.lacks(&self.misfit, self.options.tolerated_misfit) {
                     format!(
                         "{:.2} of the root mean square of what they do not predict: more than `tolerated_misfit` = {} allows",
                         self.misfit.ratio, self.options.tolerated_misfit
                     )
+                } else if self.misfit.is_systematic(self.options.tolerated_misfit) {
+                    "little beside what the causes explain".to_owned()
                 } else {
                     "which is tolerated".to_owned()
                 }

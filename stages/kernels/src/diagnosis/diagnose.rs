@@ -7,6 +7,7 @@ use super::data::{Bench, Record, Stretch, Thinned};
 use super::dynamics::{Modal, Model};
 use super::error::DiagnosisError;
 use super::fit::Blocks;
+use super::grounds::noise_loss;
 use super::lack_of_fit::misfit;
 use super::linear_only::{LinearOnly, halves, linear_only};
 use super::options::DiagnosisOptions;
@@ -103,14 +104,13 @@ pub fn diagnose(
     for baseline in found {
         let (found, used) = extend(baseline, options, work.max(WORK / LEAST_SHARE));
         work = work.saturating_sub(used);
-        let enough = found.adequate;
+        let enough = found.adequate && !found.is_lacking(options);
         extended.push(found);
         if enough {
             break;
         }
     }
-    // the first that is as good as any linear model; else the last, which a linear model alone is
-    let Some(last) = extended.pop() else { return Err(DiagnosisError::NoBaseline) };
+    let Some(last) = best_of(extended) else { return Err(DiagnosisError::NoBaseline) };
     let Extended { bench, blocks, choice, adequate } = last
         .on_all(records, interval_s, options)
         .or_else(|| last.linear_on_all(records, interval_s, options))
@@ -193,6 +193,42 @@ pub(super) struct Extended {
     pub adequate: bool,
 }
 
+impl Extended {
+    /// Whether more than noise is left: a further mode is nothing that the library of general terms predicts.
+    fn is_lacking(&self, options: &DiagnosisOptions) -> bool {
+        let Some(last) = self.choice.ladder.last() else { return true };
+        let noise = noise_loss(&self.bench, &last.fit);
+        noise.is_some_and(|noise| last.fit.loss > LOUDER * noise)
+            || self.choice.lacks(&misfit(&self.bench, &last.fit, &self.blocks), options.tolerated_misfit)
+    }
+
+    fn criterion(&self) -> f64 {
+        self.choice.ladder.last().map_or(f64::INFINITY, |last| criterion(&self.bench, &last.fit))
+    }
+}
+
+/// Mean square of what a model leaves over that of the noise in its high band, from which on another baseline is tried.
+const LOUDER: f64 = 4.0;
+
+/// Mean square of a simpler model over that of one that takes its place, at least.
+///
+/// Why: of models that all leave more than noise one with more poles follows a little more of it.
+const BETTER: f64 = 2.0;
+
+/// The first that is as good as any linear model and not far worse than those that come behind it; the last, which a linear
+/// model alone is, where none is.
+fn best_of(extended: Vec<Extended>) -> Option<Extended> {
+    let last = extended.len().checked_sub(1)?;
+    let adequate = |of: &Extended| of.adequate;
+    let far = |of: &Extended| of.blocks.count() as f64 * BETTER.ln();
+    let is_beaten = |place: usize| {
+        let own = extended[place].criterion();
+        extended[place + 1..].iter().any(|of| of.criterion() + far(of) < own)
+    };
+    let first = (0..last).find(|place| adequate(&extended[*place]) && !is_beaten(*place)).unwrap_or(last);
+    extended.into_iter().nth(first)
+}
+
 /// Extends a baseline with at most so much work; how much it was.
 fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extended, u64) {
     let Baseline { fit, bench, adequacy } = baseline;
@@ -215,11 +251,11 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extende
     (Extended { bench, blocks, choice, adequate }, used)
 }
 
-/// Steps of sections that the searches from all baselines may take together, ten seconds of two cores: single causes take a
-/// tenth of it, five causes of a measured system a half.
-const WORK: u64 = 5_000_000_000;
+/// Steps of sections that the searches from all baselines may take together: single causes take a tenth of it, five causes
+/// of a measured system most of it.
+const WORK: u64 = 2_000_000_000;
 /// Of that each baseline has one in so many, whatever those before it took.
-const LEAST_SHARE: u64 = 5;
+const LEAST_SHARE: u64 = 8;
 
 /// Fewest records that show a change from one to the next: its slope, and whether it is one.
 const ARCHIVE: usize = 4;

@@ -1,6 +1,7 @@
 //! What the models of an input and an output, or of decays, have to say for a verdict.
 
 use super::answer::Findings;
+use super::data::Bench;
 use super::dynamics::{Kind, Section};
 use super::fit::{Fit, Until};
 use super::ruling::{Claim, Grounds, high_band_variance, left_beyond_noise, left_repeating, repeats};
@@ -53,17 +54,8 @@ impl Findings<'_> {
 
     /// Variance of the noise in the output's unit, from where the system does not respond.
     fn noise(&self) -> Option<f64> {
-        let (last, layout) = (&self.choice.ladder.last()?.fit, &self.bench.layout);
-        let mut sum = 0.0;
-        for e in 0..layout.stretches() {
-            for channel in 0..layout.channels {
-                let part = layout.part(e, channel, 0, layout.samples(e));
-                let there = self.bench.output[part.clone()].iter().zip(&last.residual[part]);
-                let values: Vec<f64> = there.map(|(y, left)| if y.is_finite() { *left } else { f64::NAN }).collect();
-                sum += high_band_variance(&values)? * values.iter().filter(|value| value.is_finite()).count() as f64;
-            }
-        }
-        self.rms(sum).map(|rms| rms * rms)
+        let loss = noise_loss(self.bench, &self.choice.ladder.last()?.fit)?;
+        self.rms(loss).map(|rms| rms * rms)
     }
 
     /// What is left that repeats itself with the input, in a sentence; none where that may be noise.
@@ -103,6 +95,21 @@ impl Findings<'_> {
             section.frequency_hz
         ))
     }
+}
+
+/// What noise makes of a fit's loss, from where the system does not respond.
+pub(super) fn noise_loss(bench: &Bench, fit: &Fit) -> Option<f64> {
+    let layout = &bench.layout;
+    let mut sum = 0.0;
+    for e in 0..layout.stretches() {
+        for channel in 0..layout.channels {
+            let part = layout.part(e, channel, 0, layout.samples(e));
+            let there = bench.output[part.clone()].iter().zip(&fit.residual[part]);
+            let values: Vec<f64> = there.map(|(y, left)| if y.is_finite() { *left } else { f64::NAN }).collect();
+            sum += high_band_variance(&values)? * values.iter().filter(|value| value.is_finite()).count() as f64;
+        }
+    }
+    Some(sum)
 }
 
 /// Sum of the squares of values about their mean; those that are missing are left out.

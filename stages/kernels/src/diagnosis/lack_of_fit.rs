@@ -15,6 +15,11 @@ pub struct Misfit {
     pub significance: f64,
 }
 
+/// What is left that motion and input predict, over what the causes explain, as ratio of root mean squares, below which
+/// names stand whatever the noise. Why 0.04: a wrong law of one parameter leaves a tenth and more of the effect that it
+/// stands for; a right one of a real system some per cent, where noise is a ten-thousandth of the output.
+const NEGLIGIBLE: f64 = 0.04;
+
 /// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
 const SIGNIFICANT: f64 = 3.0;
 
@@ -35,6 +40,12 @@ impl Misfit {
     /// Whether it is more than chance and more than is tolerated.
     pub fn is_systematic(&self, tolerated: f64) -> bool {
         self.ratio > tolerated && self.is_significant()
+    }
+
+    /// Whether what can still be predicted of a squared error of `left` counts, beside `explained`, what causes take of it:
+    /// more than chance, more than is tolerated, and no trifle beside what is explained.
+    pub(super) fn counts(&self, tolerated: f64, left: f64, explained: f64) -> bool {
+        self.is_systematic(tolerated) && left * self.share() >= NEGLIGIBLE * NEGLIGIBLE * explained
     }
 
     /// Share of the squared residual.

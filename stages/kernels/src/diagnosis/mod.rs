@@ -45,6 +45,8 @@ mod simulation;
 pub mod steady;
 mod story;
 #[cfg(test)]
+mod structure_tests;
+#[cfg(test)]
 mod tests;
 mod unnamed_law;
 mod validation;

@@ -208,6 +208,18 @@ fn promise(
     Some(Promise { candidate: candidate.clone(), values, trial, gain: along * along / length })
 }
 
+/// A fit's model with another choice in the place of that of one of its causes, for each that there is.
+pub(super) fn other_choices(bench: &Bench, fit: &Fit, which: usize) -> Vec<Model> {
+    let Some(added) = fit.model.causes.get(which).filter(|added| is_choice(added.cause)) else { return Vec::new() };
+    let others = added.cause.trials(&scene(bench, fit)).into_iter().filter(|trial| *trial != added.values);
+    let with = |values| {
+        let mut model = fit.model.clone();
+        model.causes[which].values = values;
+        model
+    };
+    others.map(with).collect()
+}
+
 /// What trial values are taken from.
 fn scene(bench: &Bench, fit: &Fit) -> Scene {
     let modes = || fit.model.dynamics.sections.iter().filter(|section| section.is_mode());

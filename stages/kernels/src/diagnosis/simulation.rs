@@ -226,7 +226,7 @@ impl ModalSimulation {
                 let scaled: Vec<f64> = u.iter().map(|u| u / self.input_scale).collect();
                 let course = effects.intersample.unwrap_or(Intersample::Held);
                 let input = FineInput::new(&scaled, course, self.steps);
-                (u.len(), Some(input.passed(&effects.input, u.len(), interval_s)))
+                (u.len(), Some(input.passed(&effects.input, u.len(), interval_s, effects.by_sample)))
             }
         };
         if samples == 0 {

@@ -129,6 +129,8 @@ pub enum ModalForce {
 
 /// Most modes that a law with an order of its own sees; those of the catalogue see two.
 const MOST_MODES: usize = 8;
+/// Modes that a law of the catalogue sees: few are copied quickly.
+const FEW_MODES: usize = 2;
 
 impl ModalForce {
     /// Any force.
@@ -140,7 +142,10 @@ impl ModalForce {
     pub fn add(&self, motion: &Motion<'_>, acceleration: &mut [f64]) {
         match self {
             Self::Law(law, order) if order.is_empty() => law(motion, acceleration),
-            Self::Law(law, order) => seen_from(law, order, motion, acceleration),
+            Self::Law(law, order) if order.len() <= FEW_MODES => {
+                seen_from::<FEW_MODES>(law, order, motion, acceleration);
+            }
+            Self::Law(law, order) => seen_from::<MOST_MODES>(law, order, motion, acceleration),
             Self::Power(law) => {
                 if let (Some(to), Some(by)) = (acceleration.get_mut(law.on), law.acceleration(motion)) {
                     *to += by;
@@ -163,9 +168,9 @@ impl ModalForce {
     }
 }
 
-fn seen_from(law: &ForceLaw, order: &[usize], motion: &Motion<'_>, acceleration: &mut [f64]) {
-    let count = order.len().min(MOST_MODES);
-    let of = |values: &[f64]| -> [f64; MOST_MODES] {
+fn seen_from<const N: usize>(law: &ForceLaw, order: &[usize], motion: &Motion<'_>, acceleration: &mut [f64]) {
+    let count = order.len().min(N);
+    let of = |values: &[f64]| -> [f64; N] {
         std::array::from_fn(|i| order.get(i).and_then(|mode| values.get(*mode)).copied().unwrap_or(0.0))
     };
     let (position, velocity, omega) = (of(motion.position), of(motion.velocity), of(motion.omega));
@@ -176,7 +181,7 @@ fn seen_from(law: &ForceLaw, order: &[usize], motion: &Motion<'_>, acceleration:
         gap: position[0],
         thermal: motion.thermal,
     };
-    let mut own = [0.0; MOST_MODES];
+    let mut own = [0.0; N];
     law(&seen, &mut own[..count]);
     for (mode, own) in order.iter().zip(own) {
         if let Some(to) = acceleration.get_mut(*mode) {
@@ -268,6 +273,8 @@ pub struct Effects {
     pub input: Vec<Passage>,
     /// How a measured input runs between samples; none: as the baseline has it.
     pub intersample: Option<Intersample>,
+    /// Whether a measured input passes sample by sample, and what acts runs on straight lines between.
+    pub by_sample: bool,
 }
 
 impl Effects {
@@ -275,6 +282,7 @@ impl Effects {
     pub fn have_the_input_of(&self, others: &Self) -> bool {
         let same = |(own, other): (&Passage, &Passage)| own.is(other);
         self.intersample == others.intersample
+            && self.by_sample == others.by_sample
             && self.input.len() == others.input.len()
             && self.input.iter().zip(&others.input).all(same)
     }
@@ -365,6 +373,7 @@ impl fmt::Debug for Effects {
             .field("lost", &self.lost)
             .field("input", &self.input)
             .field("intersample", &self.intersample)
+            .field("by_sample", &self.by_sample)
             .finish()
     }
 }

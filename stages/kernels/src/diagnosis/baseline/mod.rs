@@ -6,7 +6,7 @@ mod linear;
 mod oscillator;
 
 use super::data::{Bench, Record};
-use super::dynamics::{Kind, Modal};
+use super::dynamics::{Kind, Modal, Model, Section};
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Fit, Until};
 use super::options::DiagnosisOptions;
@@ -35,6 +35,14 @@ pub(super) struct Adequacy {
 /// linear model of one nonlinear mode has several and leaves a tenth of what one leaves; one oscillator with the right
 /// causes beats them all. Without a mode that is there a hundred times as much is left.
 const CLOSE: f64 = 20.0;
+/// A model of more than one oscillator is extended, too, where it leaves less than so much of what the last simpler one does.
+///
+/// Why: modes that are there lower the error by a half and more; poles that follow a nonlinear mode by a little each, and
+/// the best linear model has many of them.
+const ELBOW: f64 = 0.7;
+/// The first of several modes beyond the best is tried last where it leaves less than so much of what the best does: where a
+/// strong law makes most of the error, a further mode does not pay for its numbers before that law is found.
+const RICHER: f64 = 0.85;
 /// Share of the signal beyond which what the best linear model leaves is as good as all of it.
 const NOTHING: f64 = 0.9;
 
@@ -113,12 +121,29 @@ pub(super) fn baselines(
         (coarse.output.iter().filter(|y| y.is_finite()).map(|y| y * y).sum::<f64>() / coarse.count as f64).sqrt();
     let least = tried.get(last).map_or(0.0, |(fit, _)| rms(fit));
     let adequacy = Adequacy { best, left: least / signal };
-    let keep = |(place, (fit, _)): (usize, &(Fit, Bench))| {
-        let simple = fit.model.dynamics.is_oscillator() || !coarse.driven;
+    let mut kept = vec![false; tried.len()];
+    // root mean square of the last that is kept
+    let mut before = f64::INFINITY;
+    for (place, (fit, _)) in tried.iter().enumerate().take(last) {
+        let simple = fit.model.dynamics.is_oscillator()
+            || !coarse.driven
+            || (fit.model.dynamics.modes() > 0 && rms(fit) < ELBOW * before);
         let near = rms(fit) <= CLOSE * least || (fit.model.dynamics.modes() == starts.needed && !coarse.driven);
-        place == last || (place < last && simple && near)
+        if simple && near {
+            kept[place] = true;
+            before = before.min(rms(fit));
+        }
+    }
+    if let Some(best) = kept.get_mut(last) {
+        *best = true;
+    }
+    let rest = tried.iter().enumerate().skip(last + 1);
+    let richer = |(_, (fit, _)): &(usize, &(Fit, Bench))| {
+        coarse.driven && fit.model.dynamics.modes() > 1 && rms(fit) < RICHER * least
     };
-    let kept: Vec<bool> = tried.iter().enumerate().map(keep).collect();
+    if let Some((place, _)) = rest.clone().find(richer) {
+        kept[place] = true;
+    }
     let of = |(fit, bench): (Fit, Bench)| Baseline { fit, bench, adequacy };
     Ok(tried.into_iter().zip(kept).filter(|(_, keep)| *keep).map(|(found, _)| of(found)).collect())
 }
@@ -130,7 +155,11 @@ fn fitted(records: &[Record<'_>], coarse: &Bench, start: &Modal, options: &Diagn
     loop {
         let bench = Bench::new(records, stretches, interval_s, start.highest_hz(), options.one_unit).ok()?;
         let model = linear::solved(&bench, &start)?;
-        let fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
+        let mut fit = Fit::new(&bench, &model, Until::steps(LINEAR_STEPS))?;
+        let left = |(own, found): (&Section, &Section)| (found.frequency_hz / own.frequency_hz - 1.0).abs() > MOVED;
+        if !bench.driven && start.sections.iter().zip(&fit.model.dynamics.sections).any(left) {
+            fit = Fit::new(&bench, &model, Until::steps(0))?;
+        }
         let Some(line) = undriven(&bench, &fit) else { return Some((fit, bench)) };
         let others: Vec<usize> = (0..start.sections.len()).filter(|section| *section != line).collect();
         start = fit.model.dynamics.of(&others);
@@ -145,18 +174,30 @@ fn undriven(bench: &Bench, fit: &Fit) -> Option<usize> {
     }
     let longest = (0..bench.layout.stretches()).map(|e| bench.layout.samples(e)).max()?;
     let lasts_s = longest as f64 * bench.interval_s;
-    let bar = fit.loss * (1.0 + DRIVEN / bench.count as f64);
     let goes_on = |s: &usize| {
         let section = dynamics.sections[*s];
         section.kind == Kind::Oscillator && 0.5 * section.omega() * section.loss * lasts_s < 1.0
     };
-    let without = |s: usize| Some(linear::left(bench, &linear::solved_undriven(bench, dynamics, s)?));
-    (0..dynamics.sections.len()).filter(goes_on).find(|s| without(*s).is_some_and(|left| left < bar))
+    let more = |model: Option<Model>| Some(linear::left(bench, &model?) - fit.loss);
+    let undriven = |s: usize| more(linear::solved_undriven(bench, dynamics, s));
+    let removed = |s: usize| {
+        let others: Vec<usize> = (0..dynamics.sections.len()).filter(|other| *other != s).collect();
+        more(linear::solved(bench, &dynamics.of(&others)))
+    };
+    let little = DRIVEN * fit.loss / bench.count as f64;
+    let owes_nothing =
+        |s: &usize| undriven(*s).is_some_and(|own| own < little || removed(*s).is_some_and(|all| own < SHARE * all));
+    (0..dynamics.sections.len()).filter(goes_on).find(owes_nothing)
 }
 
 /// Variances of the residual that the input's share in a mode takes of the loss at least: far more than chance, far
 /// less than a mode that the input drives.
 const DRIVEN: f64 = 20.0;
+/// The same as share of what the whole mode takes: what other modes lack gives a line some share in the input.
+const SHARE: f64 = 0.05;
+/// Share of its frequency by which a mode of a decay is fitted away from where the fit of decays found it: further on it
+/// follows what another one lacks, whose law is not yet known.
+const MOVED: f64 = 0.1;
 /// Steps of a linear fit from identified poles.
 const LINEAR_STEPS: usize = 20;
 

@@ -330,9 +330,9 @@ impl Bench {
         if effects.input.is_empty() {
             return (!nodes.is_empty()).then_some(Cow::Borrowed(nodes));
         }
-        if effects.input.iter().any(Passage::is_path) {
+        if effects.by_sample || effects.input.iter().any(Passage::is_path) {
             // from the record's beginning, so that all its stretches and parts see the same input
-            let mut whole = input.passed(&effects.input, stretch.end, self.interval_s);
+            let mut whole = input.passed(&effects.input, stretch.end, self.interval_s, effects.by_sample);
             return Some(Cow::Owned(whole.split_off(whole.len().saturating_sub(nodes.len()))));
         }
         let mut nodes = nodes.to_vec();

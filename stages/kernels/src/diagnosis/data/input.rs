@@ -55,10 +55,15 @@ impl FineInput {
     }
 
     /// The nodes of the intervals that begin before sample `end - 1`, through passages: all that a path remembers at
-    /// any of them.
-    pub fn passed(&self, passages: &[Passage], end: usize, interval_s: f64) -> Vec<f64> {
-        let mut nodes = self.part(0, end).to_vec();
+    /// any of them, or, `by_sample`, sample by sample with straight lines between.
+    pub fn passed(&self, passages: &[Passage], end: usize, interval_s: f64, by_sample: bool) -> Vec<f64> {
         let width = 2 * self.steps + 1;
+        let mut nodes = self.part(0, end).to_vec();
+        if by_sample {
+            let mut samples: Vec<f64> = nodes.iter().copied().step_by(width).collect();
+            pass(passages, |k| k as f64 * interval_s, &mut samples);
+            return Self::new(&samples, Intersample::Linear, self.steps).nodes;
+        }
         let time_s = |node: usize| {
             let place = (node % width) as f64 / (width - 1) as f64;
             ((node / width) as f64 + place) * interval_s

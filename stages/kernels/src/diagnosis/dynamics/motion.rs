@@ -8,7 +8,7 @@ use super::modal::Modal;
 use super::model::State;
 use super::propagator::Propagator;
 use super::section::Section;
-use crate::effects::{Effects, Instant};
+use crate::effects::{Effects, Instant, ModalForce};
 
 /// Where a stretch of samples lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +63,9 @@ pub(crate) struct Run<'a> {
 /// Sections that a motion takes; more have no motion.
 const MOST_SECTIONS: usize = 32;
 
+/// Sections whose step takes as long as that of a law that is no product of powers: a hyperbolic tangent for each motion.
+const LAW: usize = 8;
+
 impl Run<'_> {
     fn sections(&self) -> &[Section] {
         &self.dynamics.sections
@@ -72,11 +75,12 @@ impl Run<'_> {
         !self.effects.modal_force.is_empty()
     }
 
-    /// Steps of its sections, those of a motion that forces bend four times.
+    /// Steps of its sections and of the laws that bend it, those of a motion that forces bend four times.
     pub fn work(&self) -> u64 {
         let Span { samples, steps, .. } = self.span;
         let bent = if self.is_bent() { 4 } else { 1 };
-        (samples * steps * self.sections().len() * bent) as u64
+        let laws = self.effects.modal_force.iter().filter(|force| matches!(force, ModalForce::Law(..))).count();
+        (samples * steps * (self.sections().len() + LAW * laws) * bent) as u64
     }
 
     /// Modes come first.

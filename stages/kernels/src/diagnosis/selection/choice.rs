@@ -3,6 +3,7 @@
 use crate::causes::About;
 use crate::diagnosis::data::Bench;
 use crate::diagnosis::fit::{Blocks, Fit};
+use crate::diagnosis::lack_of_fit::Misfit;
 
 /// A model with what it loses on folds that it has not seen, block by block.
 #[derive(Clone)]
@@ -67,6 +68,18 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
+    /// What the causes take of the squared residual, together.
+    pub(crate) fn explained(&self) -> f64 {
+        let ends = self.ladder.first().zip(self.ladder.last());
+        ends.map_or(0.0, |(first, last)| (first.fit.loss - last.fit.loss).max(0.0))
+    }
+
+    /// Whether what its last model leaves is not the whole story: `misfit` of that model.
+    pub(crate) fn lacks(&self, misfit: &Misfit, tolerated: f64) -> bool {
+        let left = self.ladder.last().map_or(0.0, |last| last.fit.loss);
+        misfit.counts(tolerated, left, self.explained())
+    }
+
     /// Loss of its last model on folds that it has not seen.
     pub(super) fn unseen(&self) -> f64 {
         self.ladder.last().map_or(f64::INFINITY, Judged::unseen)

@@ -10,7 +10,7 @@ use super::fit::{Blocks, Chords, Fit, Until, dot};
 use super::instants::instant;
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
-use super::score_test::{Candidate, Promise, Sample, screen, significance};
+use super::score_test::{Candidate, Promise, Sample, other_choices, screen, significance};
 use crate::causes::{About, Cause};
 
 /// Candidates that are fitted at each step.
@@ -121,10 +121,25 @@ impl Search<'_> {
                 return nearest;
             }
             match self.best(&current, &promises) {
-                Some(next) => ladder.push(next),
+                Some(next) => ladder.push(self.best_choice(next)),
                 None => return nearest,
             }
         }
+    }
+
+    /// The same with the best choice in the place of each of its choices: what the score has chosen while other causes
+    /// were missing has no slope that would lead to another.
+    fn best_choice(&self, judged: Judged) -> Judged {
+        let mut best = judged;
+        for which in 0..best.fit.model.causes.len() {
+            let others = other_choices(self.bench, &best.fit, which);
+            let others = others.iter().filter_map(|model| Fit::new(self.bench, model, Until::JUDGED));
+            if let Some(better) = others.filter(|fit| fit.loss < best.fit.loss).min_by(|a, b| a.loss.total_cmp(&b.loss))
+            {
+                best = Judged::new(better, self.bench, &self.blocks);
+            }
+        }
+        best
     }
 
     /// The best of the first few promises that passes.
