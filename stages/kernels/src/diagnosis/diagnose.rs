@@ -104,14 +104,14 @@ pub fn diagnose(
     for baseline in found {
         let (found, used) = extend(baseline, options, work.max(WORK / LEAST_SHARE));
         work = work.saturating_sub(used);
-        let enough = found.adequate && !found.is_lacking(options);
+        let enough = found.adequate && (found.far_better || !found.is_lacking(options));
         extended.push(found);
         if enough {
             break;
         }
     }
     let Some(last) = best_of(extended) else { return Err(DiagnosisError::NoBaseline) };
-    let Extended { bench, blocks, choice, adequate } = last
+    let Extended { bench, blocks, choice, adequate, .. } = last
         .on_all(records, interval_s, options)
         .or_else(|| last.linear_on_all(records, interval_s, options))
         .ok_or(DiagnosisError::NoBaseline)?;
@@ -191,6 +191,8 @@ pub(super) struct Extended {
     pub choice: Choice,
     /// Whether the extended model describes as much as any linear model does.
     pub adequate: bool,
+    /// Whether it leaves so much less than any linear model that no other structure is looked for.
+    pub far_better: bool,
 }
 
 impl Extended {
@@ -209,6 +211,10 @@ impl Extended {
 
 /// Mean square of what a model leaves over that of the noise in its high band, from which on another baseline is tried.
 const LOUDER: f64 = 4.0;
+
+/// Mean square of the best linear model over that of an extended one which no other structure beats: a mode that is missing
+/// leaves of it what the linear models with that mode have taken.
+const FAR_BETTER: f64 = 100.0;
 
 /// Mean square of a simpler model over that of one that takes its place, at least.
 ///
@@ -247,8 +253,10 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extende
     // where the linear model is the best there is, what extends it need not pay for itself in blocks: F tests decide
     let ends = [choice.ladder.first(), choice.ladder.last()];
     let adequate = ends.iter().flatten().any(|model| adequacy.holds(criterion(&bench, &model.fit)));
+    let far = blocks.count() as f64 * FAR_BETTER.ln();
+    let far_better = ends[1].is_some_and(|last| adequacy.holds(criterion(&bench, &last.fit) + far));
     let used = bench.work() - begin;
-    (Extended { bench, blocks, choice, adequate }, used)
+    (Extended { bench, blocks, choice, adequate, far_better }, used)
 }
 
 /// Steps of sections that the searches from all baselines may take together: single causes take a tenth of it, five causes

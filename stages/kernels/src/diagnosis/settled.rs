@@ -120,7 +120,13 @@ impl Extended {
             ladder.push(last);
         }
         let nearest = self.choice.nearest.clone();
-        Some(Self { choice: Choice { ladder, chosen, nearest }, bench, blocks, adequate: self.adequate })
+        Some(Self {
+            choice: Choice { ladder, chosen, nearest },
+            bench,
+            blocks,
+            adequate: self.adequate,
+            far_better: self.far_better,
+        })
     }
 
     /// The linear model alone on all samples: no account of them, where what extends it diverges there. None: it diverges,
@@ -133,7 +139,7 @@ impl Extended {
         start.dynamics.interval_s = interval_s;
         let ladder = vec![Judged::new(Fit::new(&bench, &start, Until::MINIMUM)?, &bench, &blocks)];
         let choice = Choice { ladder, chosen: Vec::new(), nearest: self.choice.nearest.clone() };
-        Some(Self { choice, bench, blocks, adequate: false })
+        Some(Self { choice, bench, blocks, adequate: false, far_better: false })
     }
 
     /// All samples, and whether they are those that the search had.
