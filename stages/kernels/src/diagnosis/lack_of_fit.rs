@@ -16,9 +16,9 @@ pub struct Misfit {
 }
 
 /// What is left that motion and input predict, over what the causes explain, as ratio of root mean squares, below which
-/// names stand whatever the noise. Why 0.04: a wrong law of one parameter leaves a tenth and more of the effect that it
+/// names stand whatever the noise. Why 0.02: a wrong law of one parameter leaves a tenth and more of the effect that it
 /// stands for; a right one of a real system some per cent, where noise is a ten-thousandth of the output.
-const NEGLIGIBLE: f64 = 0.04;
+const NEGLIGIBLE: f64 = 0.02;
 
 /// Block-wise standard errors beyond which a misfit is one: one chance in six hundred.
 const SIGNIFICANT: f64 = 3.0;
