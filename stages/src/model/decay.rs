@@ -112,7 +112,7 @@ impl Stage for DecayFit {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "model.decay",
-        version: 15,
+        version: 16,
         summary: "fits modes and mode shapes to free decays of several channels and hits",
         inputs: &[DECAYS.spec()],
         outputs: &[MODES.spec(), SHAPES.spec(), HITS.spec(), COURSE.spec(), SYSTEMS.spec(), FIT.spec(), SUMMARY.spec()],

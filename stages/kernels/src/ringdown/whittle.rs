@@ -1,5 +1,7 @@
 //! Noise variances from what the events' fits leave.
 
+use std::f64::consts::{PI, TAU};
+
 use rayon::prelude::*;
 
 use super::noise::RingdownNoise;
@@ -9,6 +11,18 @@ use crate::signal::{RealTransform, hann as raised_cosine};
 pub fn hann(samples: usize) -> Vec<f64> {
     let scale = (8.0f64 / 3.0).sqrt();
     raised_cosine(samples, 0.5).into_iter().map(|w| scale * w).collect()
+}
+
+/// [`autocorrelation`](crate::signal::autocorrelation) of [`hann`] in closed form: sums of cosines. Of three samples at
+/// least.
+pub(super) fn hann_autocorrelation(samples: usize) -> Vec<f64> {
+    let n = samples as f64;
+    let (first, second) = ((PI / n).sin().recip(), 0.5 * (TAU / n).sin().recip());
+    let at = |lag: usize| {
+        let (sin, cos) = (TAU * lag as f64 / n).sin_cos();
+        (8.0 / 3.0) / (4.0 * n) * ((samples - lag) as f64 * (1.0 + 0.5 * cos) + sin * (first - second))
+    };
+    (0..samples).map(at).collect()
 }
 
 /// Expected tapered periodogram of each part of the noise at unit variance: parts x bins; `lag_weights`:
@@ -33,6 +47,10 @@ pub(super) fn expected_parts_by(
     (0..noise.parts())
         .into_par_iter()
         .map(|part| {
+            if part == 0 {
+                // white: lag 0 alone
+                return vec![lag_weights[0].max(0.0); plan.bins()];
+            }
             let at = |lag: usize| noise.unit_covariance(part, lag as f64 * interval_s) * lag_weights[lag];
             let folded = (0..n).map(|lag| if lag == 0 { at(0) } else { at(lag) + at(n - lag) });
             plan.forward(folded).iter().map(|bin| bin.re.max(0.0)).collect()
@@ -125,4 +143,21 @@ fn non_negative(normal: &[Vec<f64>], right: &[f64], start: &[f64]) -> Vec<f64> {
         }
     }
     x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::autocorrelation;
+
+    #[test]
+    fn the_autocorrelation_of_hanns_taper_is_known_in_closed_form() {
+        for samples in [3, 24, 57, 1000] {
+            let by_transform = autocorrelation(&hann(samples));
+            for (lag, (closed, found)) in hann_autocorrelation(samples).iter().zip(by_transform).enumerate() {
+                // rounding of a transform of unit variance, and of the difference of two cosecants of N each
+                assert!((closed - found).abs() < 1e-12, "{samples} {lag}: {closed} for {found}");
+            }
+        }
+    }
 }

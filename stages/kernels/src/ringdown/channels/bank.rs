@@ -3,10 +3,11 @@
 use faer::c64;
 use rayon::prelude::*;
 
-use super::basis::Poles;
+use super::basis::{Poles, decaying};
 use super::fit::Fitted;
 use super::levels::{Density, residuals};
 use super::records::Records;
+use crate::linear_algebra::dot_in_lanes;
 use crate::ringdown::RingdownNoise;
 
 /// Ratio of neighbouring decay rates of the bank: at most a tenth of the energy is lost between two.
@@ -101,12 +102,16 @@ impl<'a> Bank<'a> {
             k >= slowest_bin && k + 1 < gain.len() && w.hypot(rate) >= 2.0 * rate * self.least_q * 1.05
         };
         let is_peak = |k: usize| gain[k] >= gain[k - 1] && gain[k] >= gain[k + 1] && allowed(k);
-        let mut found: Vec<(f64, c64)> = (1..gain.len() - 1)
-            .filter(|&k| is_peak(k))
-            .map(|k| (gain[k], c64::new(-rate / interval_s, turn * k as f64 / interval_s)))
-            .collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        found.truncate(most);
+        let mut found: Vec<(f64, c64)> = Vec::new();
+        for k in 1..gain.len() - 1 {
+            // most bins are below what is kept already
+            let is_below = found.len() == most && found.last().is_none_or(|last| gain[k] <= last.0);
+            if !is_below && is_peak(k) {
+                let place = found.partition_point(|other| other.0 >= gain[k]);
+                found.insert(place, (gain[k], c64::new(-rate / interval_s, turn * k as f64 / interval_s)));
+                found.truncate(most);
+            }
+        }
         found
     }
 }
@@ -114,11 +119,12 @@ impl<'a> Bank<'a> {
 impl Rate {
     fn of(records: &Records<'_>, left: &[Vec<f64>], rate: f64) -> Self {
         let samples = records.longest.min((GONE / rate).ceil() as usize + 1);
-        let factors: Vec<f64> = (0..samples).map(|k| (-rate * k as f64).exp()).collect();
+        let factors = decaying(rate, samples);
         let plan = records.plans.of((2 * samples).next_power_of_two());
         let mut gains = vec![vec![0.0; plan.bins()]; records.channels];
         for (record, values) in records.all.iter().zip(left) {
-            let energy: f64 = factors.iter().take(values.len()).map(|factor| factor * factor).sum();
+            let seen = &factors[..samples.min(values.len())];
+            let energy = dot_in_lanes(seen, seen);
             let power = plan.power(values.iter().zip(&factors).map(|(y, factor)| y * factor));
             gains[record.channel].iter_mut().zip(power).for_each(|(g, p)| *g += 2.0 * p / energy);
         }

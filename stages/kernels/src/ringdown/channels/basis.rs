@@ -94,6 +94,21 @@ pub(super) fn signal(poles: &Poles, own: &[f64], interval_s: f64, samples: usize
     out
 }
 
+/// Samples between two exponentials of [`decaying`] that are taken by themselves.
+const ANCHORED: usize = 64;
+
+/// `exp(-rate k)`, `rate` in nepers per sample: a product of two exponentials each.
+pub(super) fn decaying(rate: f64, samples: usize) -> Vec<f64> {
+    let fine: [f64; ANCHORED] = std::array::from_fn(|k| (-rate * k as f64).exp());
+    let mut all = Vec::with_capacity(samples.next_multiple_of(ANCHORED));
+    while all.len() < samples {
+        let first = (-rate * all.len() as f64).exp();
+        all.extend(fine.iter().map(|factor| first * factor));
+    }
+    all.truncate(samples);
+    all
+}
+
 /// Samples side by side, for the processor's vector units.
 const LANES: usize = 8;
 
@@ -129,5 +144,21 @@ impl Turning {
             }
         }
         rest.iter_mut().zip(&self.re).for_each(|(y, re)| *y += re);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decay_is_the_exponential_of_each_sample() {
+        for (rate, samples) in [(1e-4, 1000), (0.3, 65), (2.0, 3), (1e-3, 0)] {
+            let all = decaying(rate, samples);
+            assert_eq!(all.len(), samples);
+            // two roundings beside that of the exponential
+            let is_one = |(k, value): (usize, &f64)| (value / (-rate * k as f64).exp() - 1.0).abs() < 1e-15;
+            assert!(all.iter().enumerate().all(is_one), "{rate} {samples}");
+        }
     }
 }

@@ -89,6 +89,10 @@ pub const MOVES: f64 = 1e-3;
 /// is `(1 - e^-u) (1 - u^2 e^-u / (1 - e^-u)^2)` of all and after `e^-u`; the sum of inverses is least at u = 1.8.
 /// What a frequency quadratic in the amplitude moves between the parts does not depend on the cut.
 const CUT: f64 = 0.9;
+/// Samples that long first parts are a multiple of: their transforms are quicker, and like decays have like parts.
+const BLOCK: usize = 64;
+/// First parts of fewer such blocks end at any sample: a tenth of the best length at most does not count.
+const LEAST_BLOCKS: usize = 10;
 /// Energy of a mode in a part, in variances of the noise, that a comparison needs: in the last part its damping is then
 /// known to `2/sqrt(50)`, 28 %.
 const KNOWN: f64 = 50.0;
@@ -334,6 +338,7 @@ impl Decays<'_> {
         let longest = self.events.iter().flatten().map(|row| row.len()).max().unwrap_or(0);
         let cut = (CUT / (-fit.poles[strongest].re * self.interval_s)) as usize;
         let cut = cut.clamp(1, (longest / 2).max(1));
+        let cut = if cut < LEAST_BLOCKS * BLOCK { cut } else { cut - cut % BLOCK };
         let part = |range: Range<usize>| {
             let known = seen(fit, self.interval_s, &range, KNOWN);
             if known.is_empty() { None } else { self.of_part(range, &known).ok() }

@@ -3,7 +3,7 @@
 use faer::c64;
 use rayon::prelude::*;
 
-use super::basis::Poles;
+use super::basis::{Poles, decaying};
 use super::fit::Fitted;
 use super::noise::residual;
 use super::records::Records;
@@ -58,16 +58,15 @@ impl Envelope {
     fn of(pole: c64, records: &Records<'_>) -> Self {
         let rate = (-pole.re * records.interval_s).max(1e-300);
         let samples = records.longest.min((GONE / rate).ceil().max(16.0) as usize);
-        let weights: Vec<f64> = (0..samples).map(|k| (-rate * k as f64).exp()).collect();
-        let sums = |power: i32| {
-            let mut sum = 0.0;
-            let add = |weight: &f64| {
-                sum += weight.powi(power);
-                sum
-            };
-            weights.iter().map(add).collect()
+        let weights = decaying(rate, samples);
+        let (mut square, mut fourth) = (0.0, 0.0);
+        let add = |weight: &f64| {
+            let own = weight * weight;
+            square += own;
+            fourth += own * own;
+            (square, fourth)
         };
-        let (squares, fourths) = (sums(2), sums(4));
+        let (squares, fourths) = weights.iter().map(add).unzip();
         Self { weights, squares, fourths }
     }
 }

@@ -12,7 +12,7 @@ use super::records::{Record, Records};
 use crate::ringdown::RingdownNoise;
 use crate::ringdown::gaps::Gaps;
 use crate::ringdown::noise_estimate::parts_of;
-use crate::ringdown::whittle::{expected_parts_by, hann, variances};
+use crate::ringdown::whittle::{expected_parts_by, hann, hann_autocorrelation, variances};
 use crate::signal::{RealTransform, summed_periodograms};
 
 /// Gain of twice the log-likelihood that wander needs: what a handful of variances that are not there yield once in a
@@ -91,10 +91,9 @@ impl<'a> NoiseModel<'a> {
             ChannelNoise::White => rescaled(self.records, fitted, last),
             ChannelNoise::Estimated => {
                 let expected = self.expected.get_or_init(|| self.expectations());
-                let shared: Vec<Vec<f64>> =
-                    expected.par_iter().map(|pattern| self.absorbed_of_white(fitted, pattern, last)).collect();
+                let shared = OnceLock::new();
                 let of = |c| {
-                    let noise = self.of_channel(fitted, &last[c], expected, &shared, c);
+                    let noise = self.of_channel(fitted, last, expected, &shared, c);
                     at_least(noise, self.records.rounding[c])
                 };
                 (0..self.records.channels).into_par_iter().map(of).collect()
@@ -114,7 +113,10 @@ impl<'a> NoiseModel<'a> {
         }
         let of = |(samples, mask): (usize, &[bool])| {
             let taper = hann(samples);
-            let lags = Gaps::of_mask(mask).lag_weights(&taper);
+            let lags = match mask {
+                [] => hann_autocorrelation(samples),
+                _ => Gaps::of_mask(mask).lag_weights(&taper),
+            };
             let plan = self.records.plans.of(samples);
             let parts = expected_parts_by(&plan, &self.parts, self.records.interval_s, &lags);
             Expected { samples, mask: mask.to_vec(), plan, taper, parts }
@@ -126,24 +128,38 @@ impl<'a> NoiseModel<'a> {
     fn of_channel(
         &self,
         fitted: &Fitted,
-        last: &RingdownNoise,
+        all_last: &[RingdownNoise],
         expected: &[Expected],
-        shared: &[Vec<f64>],
+        shared: &OnceLock<Vec<Vec<f64>>>,
         channel: usize,
     ) -> RingdownNoise {
-        let mut bins: Vec<Bins<'_>> = Vec::new();
-        for (pattern, shared) in expected.iter().zip(shared) {
+        let last = &all_last[channel];
+        let (mut bins, mut places) = (Vec::new(), Vec::new());
+        for (number, pattern) in expected.iter().enumerate() {
             let own = |i: &usize| pattern.has(&self.records.all[*i]) && self.records.all[*i].channel == channel;
             let members: Vec<usize> = (0..self.records.all.len()).filter(own).collect();
             let Some(&first) = members.first() else { continue };
-            let mut own = self.of_pattern(fitted, pattern, &members);
+            bins.push(self.of_pattern(fitted, pattern, &members));
+            places.push((number, first));
+        }
+        // white noise needs what is absorbed as a number alone
+        if last.is_white() && self.free.is_empty() {
+            let white = level(&bins) / (1.0 - self.share_absorbed(fitted, channel));
+            if !may_wander(&bins, white) {
+                return RingdownNoise::white(white.max(f64::MIN_POSITIVE));
+            }
+        }
+        for ((number, first), own) in places.into_iter().zip(&mut bins) {
+            let pattern = &expected[number];
             if last.is_white() {
-                own.observed.iter_mut().zip(shared).for_each(|(o, a)| *o += last.white * a);
+                let of_white =
+                    || expected.par_iter().map(|own| self.absorbed_of_white(fitted, own, all_last)).collect();
+                let shared: &Vec<Vec<f64>> = shared.get_or_init(of_white);
+                own.observed.iter_mut().zip(&shared[number]).for_each(|(o, a)| *o += last.white * a);
             } else if self.absorbs(fitted, pattern) {
                 let absorbed = self.absorbed(fitted, pattern, &fitted.projection.solved[first].root);
                 own.observed.iter_mut().zip(absorbed).for_each(|(o, a)| *o += a);
             }
-            bins.push(own);
         }
         for stretch in self.free.iter().filter_map(|channels| channels.get(channel)) {
             let own = |pattern: &&Expected| pattern.samples == stretch.len() && pattern.mask.is_empty();
@@ -170,6 +186,13 @@ impl<'a> NoiseModel<'a> {
         let count = members.len() as f64;
         observed.iter_mut().for_each(|o| *o /= count);
         Bins { observed, parts: &pattern.parts, count }
+    }
+
+    /// Share of a channel's samples that its records' own amplitudes take up.
+    fn share_absorbed(&self, fitted: &Fitted, channel: usize) -> f64 {
+        let records = self.records.all.iter().filter(|record| record.channel == channel).count();
+        let own = (records * own_count(fitted.poles.0.len(), self.records.drift)) as f64;
+        (own / self.records.observed(channel).max(1) as f64).min(0.5)
     }
 
     /// Whether what the own amplitudes absorb counts.
@@ -255,10 +278,67 @@ struct Bins<'a> {
     count: f64,
 }
 
+/// Variance of white noise that these bins have on average.
+fn level(bins: &[Bins<'_>]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for group in bins {
+        let there = group.observed.iter().zip(&group.parts[0]).skip(1);
+        sum += there.map(|(observed, unit)| observed / unit.max(1e-300)).sum::<f64>();
+        count += group.observed.len() - 1;
+    }
+    sum / count as f64
+}
+
+/// Share of [`WANDER_GAIN`] that the score test has to promise. Why a quarter: of parts that are alike each promises a share;
+/// of power above the level the score's square, a parabola in it, promises more than its logarithm gains.
+const PROMISED: f64 = 0.25;
+
+/// Whether wander beside white noise of this variance may raise the likelihood enough, by its score there.
+///
+/// # Source
+/// C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50.
+fn may_wander(bins: &[Bins<'_>], white: f64) -> bool {
+    let parts = bins.first().map_or(0, |group| group.parts.len());
+    // score, information, and information that is white noise's
+    let (mut score, mut own, mut shared) = (vec![0.0; parts], vec![0.0; parts], vec![0.0; parts]);
+    let mut all = 0.0;
+    for group in bins {
+        all += group.count * (group.observed.len() - 1) as f64;
+        for part in 1..parts {
+            let (mut a, mut b, mut c) = (0.0, 0.0, 0.0);
+            let there = group.observed.iter().zip(&group.parts[0]).zip(&group.parts[part]).skip(1);
+            for ((observed, level), power) in there {
+                let level = (level * white).max(f64::MIN_POSITIVE);
+                let share = power / level;
+                a += share * (observed / level - 1.0);
+                b += share * share;
+                c += share;
+            }
+            score[part] += group.count * a;
+            own[part] += group.count * b;
+            shared[part] += group.count * c;
+        }
+    }
+    let promise: f64 = (1..parts)
+        .map(|part| score[part].max(0.0).powi(2) / (own[part] - shared[part] * shared[part] / all).max(1e-300))
+        .sum();
+    // of no number nothing can be said
+    promise.is_nan() || promise / CORRELATED >= PROMISED * WANDER_GAIN
+}
+
 /// Variances under which all bins are likeliest; white noise alone where wander does not raise the likelihood enough.
 ///
 /// `last`: the white part to start from.
 fn likeliest(bins: &[Bins<'_>], shape: &RingdownNoise, last: f64) -> RingdownNoise {
+    let white = level(bins);
+    if !may_wander(bins, white) {
+        return RingdownNoise::white(white.max(f64::MIN_POSITIVE));
+    }
+    likeliest_of_all(bins, shape, last)
+}
+
+/// The same by the fit of all parts.
+fn likeliest_of_all(bins: &[Bins<'_>], shape: &RingdownNoise, last: f64) -> RingdownNoise {
     // bin 0 is each record's own offset: `variances` leaves the first out, a dummy here
     let mut observed = vec![0.0];
     let mut unit = vec![vec![0.0]; shape.parts()];
@@ -267,8 +347,7 @@ fn likeliest(bins: &[Bins<'_>], shape: &RingdownNoise, last: f64) -> RingdownNoi
         unit.iter_mut().zip(group.parts).for_each(|(all, part)| all.extend_from_slice(&part[1..]));
     }
     let mean = (observed.iter().sum::<f64>() / (observed.len() - 1) as f64).max(f64::MIN_POSITIVE);
-    let white = observed.iter().zip(&unit[0]).skip(1).map(|(o, u)| o / u.max(1e-300)).sum::<f64>()
-        / (observed.len() - 1) as f64;
+    let white = level(bins);
     let start: Vec<f64> = unit
         .iter()
         .enumerate()
@@ -297,4 +376,46 @@ fn likeliest(bins: &[Bins<'_>], shape: &RingdownNoise, last: f64) -> RingdownNoi
         return RingdownNoise::white(white.max(f64::MIN_POSITIVE));
     }
     shape.with_variances(&values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::white_noise;
+
+    /// Unit white noise, and beside it wander of that variance with that rate, nepers per sample.
+    fn noise(samples: usize, (variance, rate): (f64, f64), seed: u64) -> Vec<f64> {
+        let decay = (-rate).exp();
+        let mut slow = 0.0;
+        let driving = white_noise(samples, (variance * (1.0 - decay * decay)).sqrt(), seed + 1000);
+        let white = white_noise(samples, 1.0, seed);
+        let add = |(own, drive): (&f64, &f64)| {
+            slow = decay * slow + drive;
+            own + slow
+        };
+        white.iter().zip(&driving).map(add).collect()
+    }
+
+    #[test]
+    fn where_its_score_promises_nothing_the_fit_finds_no_wander() {
+        const SAMPLES: usize = 2000;
+        let (plan, taper) = (RealTransform::new(SAMPLES), hann(SAMPLES));
+        let shape = parts_of(&[], 1.0, 1.0, SAMPLES);
+        let parts = expected_parts_by(&plan, &shape, 1.0, &hann_autocorrelation(SAMPLES));
+        let mut silent = [0; 4];
+        for (kind, wander) in [(0.0, 0.1), (0.01, 0.05), (0.1, 0.003), (1.0, 0.03)].into_iter().enumerate() {
+            for seed in 0..100 {
+                let signal = noise(SAMPLES, wander, seed);
+                let observed = summed_periodograms(&plan, &[signal], &taper);
+                let bins = [Bins { observed, parts: &parts, count: 1.0 }];
+                if !may_wander(&bins, level(&bins)) {
+                    silent[kind] += 1;
+                    assert!(likeliest_of_all(&bins, &shape, 1.0).is_white(), "{wander:?} {seed}");
+                }
+            }
+        }
+        // three scores of one degree of freedom each, their sum above 4.5 in some 12 %; wander of the noise's own variance
+        // has a gain of hundreds
+        assert!(silent[0] >= 75 && silent[3] == 0, "{silent:?}");
+    }
 }

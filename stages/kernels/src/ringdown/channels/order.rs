@@ -439,9 +439,11 @@ impl Ladder<'_> {
         if even {
             let poles = fitted.poles.0.clone();
             let mean = |noise: &RingdownNoise| poles.iter().map(|s| level(noise, s)).sum::<f64>() / poles.len() as f64;
-            for round in 0..NOISE_ROUNDS {
+            // the level of one channel's white noise moves no pole
+            let rounds = if noise.len() == 1 && noise[0].is_white() { 1 } else { NOISE_ROUNDS };
+            for round in 0..rounds {
                 let white: Vec<RingdownNoise> = noise.iter().map(|noise| RingdownNoise::white(mean(noise))).collect();
-                fitted = self.fit(&fitted.poles, &white, if round + 1 == NOISE_ROUNDS { ARRIVED } else { NEARLY });
+                fitted = self.fit(&fitted.poles, &white, if round + 1 == rounds { ARRIVED } else { NEARLY });
                 noise = match noise.iter().all(RingdownNoise::is_white) {
                     true => rescaled(self.records, &fitted, &white),
                     false => self.noise.estimated(&fitted, &white),

@@ -21,6 +21,8 @@ pub(super) struct Recursion<'a> {
     head: usize,
     /// Columns of a block from sample 0 on: own amplitudes of modes, 1, the changes' columns, the sample's number.
     block: Mat<f64>,
+    /// The first of these rows with the record's own ramp, as many as stand before the first whole block.
+    begin: Mat<f64>,
     /// Upper triangle of all columns.
     triangle: Mat<f64>,
 }
@@ -42,26 +44,28 @@ impl<'a> Recursion<'a> {
         let head = samples % BLOCK;
         let width = own_count(modes, drift) + 2 * modes;
         let mut it =
-            Self { poles, interval_s, unit_s, samples, drift, head, block, triangle: Mat::zeros(width, width) };
-        it.triangle = it.doubled();
+            Self { poles, interval_s, unit_s, samples, drift, head, block, begin: Mat::new(), triangle: Mat::new() };
+        let rows = it.rows(width);
+        it.begin = rows.get(..head, ..).to_owned();
+        it.triangle = it.doubled(&rows);
         it
     }
 
-    fn doubled(&self) -> Mat<f64> {
-        let rows = self.rows();
+    fn doubled(&self, rows: &Mat<f64>) -> Mat<f64> {
         let mut total = match self.head {
             0 => Mat::zeros(rows.ncols(), rows.ncols()),
-            head => TallQr::triangle(rows.as_ref().get(..head, ..)),
+            _ => TallQr::triangle(self.begin.as_ref()),
         };
         let mut counted = self.head;
         let (mut part, mut size) = (TallQr::triangle(rows.as_ref()), BLOCK);
         while counted < self.samples {
             if (self.samples - self.head) & size != 0 {
-                total = stacked(&total, &self.shifted(&part, counted));
+                total = stacked(total, self.shifted(&part, counted));
                 counted += size;
             }
             if counted < self.samples {
-                part = stacked(&part, &self.shifted(&part, size));
+                let later = self.shifted(&part, size);
+                part = stacked(part, later);
                 size *= 2;
             }
         }
@@ -73,10 +77,10 @@ impl<'a> Recursion<'a> {
     }
 
     /// Rows of the first block with the record's own ramp.
-    fn rows(&self) -> Mat<f64> {
+    fn rows(&self, width: usize) -> Mat<f64> {
         let own = 2 * self.poles.0.len() + 1;
         let centre = self.centre();
-        Mat::from_fn(BLOCK, self.triangle.ncols(), |i, j| match j {
+        Mat::from_fn(BLOCK, width, |i, j| match j {
             _ if j < own => self.block[(i, j)],
             _ if self.drift && j == own => (i as f64 - centre) / centre,
             _ => self.block[(i, j - usize::from(self.drift))],
@@ -155,9 +159,9 @@ impl<'a> Recursion<'a> {
     fn products(&self, signal: &[f64]) -> Vec<f64> {
         let modes = self.poles.0.len();
         let (own, plain) = (own_count(modes, self.drift), 2 * modes + 1);
-        let rows = self.rows();
+        let begin = &self.begin;
         let mut out: Vec<f64> =
-            (0..rows.ncols()).map(|j| (0..self.head).map(|k| rows[(k, j)] * signal[k]).sum()).collect();
+            (0..begin.ncols()).map(|j| (0..self.head).map(|k| begin[(k, j)] * signal[k]).sum()).collect();
         let inner = product(self.block.transpose(), self.tail(signal));
         let first_s = |b: usize| (self.head + b * BLOCK) as f64 * self.interval_s / self.unit_s;
         for j in 0..modes {
@@ -213,10 +217,10 @@ impl<'a> Recursion<'a> {
         let number = self.block.ncols() - 1;
         let plain = Mat::from_fn(BLOCK, one + 2, |i, j| self.block[(i, if j <= one { j } else { number })]);
         let fitted = product(plain.as_ref(), shares.as_ref());
-        let rows = self.rows();
+        let begin = &self.begin;
         let mut left = signal.to_vec();
         for (j, a) in amplitudes.iter().enumerate() {
-            left.iter_mut().take(self.head).enumerate().for_each(|(k, y)| *y -= a * rows[(k, j)]);
+            left.iter_mut().take(self.head).enumerate().for_each(|(k, y)| *y -= a * begin[(k, j)]);
         }
         for (own, fitted) in left[self.head..].chunks_exact_mut(BLOCK).zip(fitted.col_iter()) {
             own.iter_mut().zip(fitted.iter()).for_each(|(y, f)| *y -= f);
@@ -262,11 +266,33 @@ const ROUNDING: f64 = 1e-13;
 /// Share of an energy below which a difference from it is known to less than a millionth.
 const CANCELLED: f64 = 1e-9;
 
-/// Triangle of two triangles, one above the other.
-fn stacked(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
+/// Triangle of a triangle above another one that was [`Recursion::shifted`], by reflections that know where both are zero:
+/// turned columns have one entry below the diagonal.
+fn stacked(mut upper: Mat<f64>, mut lower: Mat<f64>) -> Mat<f64> {
     let n = upper.nrows();
-    let both = Mat::from_fn(2 * n, upper.ncols(), |i, j| if i < n { upper[(i, j)] } else { lower[(i - n, j)] });
-    TallQr::triangle(both.as_ref())
+    for j in 0..n {
+        let rows = (j + 2).min(n);
+        let below = dot_in_lanes(&lower.col_as_slice(j)[..rows], &lower.col_as_slice(j)[..rows]);
+        if below == 0.0 {
+            continue;
+        }
+        let head = upper[(j, j)];
+        let length = head.hypot(below.sqrt());
+        // away from the head, so that nothing cancels
+        let first = head + if head < 0.0 { -length } else { length };
+        let factor = 2.0 / (first * first + below);
+        upper[(j, j)] = if head < 0.0 { length } else { -length };
+        let (done, rest) = lower.as_mut().split_at_col_mut(j + 1);
+        let reflector = done.as_ref().col(j).try_as_col_major().map_or(&[][..], |column| &column.as_slice()[..rows]);
+        for (k, column) in rest.col_iter_mut().enumerate() {
+            let Some(column) = column.try_as_col_major_mut() else { continue };
+            let column = &mut column.as_slice_mut()[..rows];
+            let along = factor * (first * upper[(j, j + 1 + k)] + dot_in_lanes(reflector, column));
+            upper[(j, j + 1 + k)] -= along * first;
+            column.iter_mut().zip(reflector).for_each(|(value, own)| *value -= along * own);
+        }
+    }
+    upper
 }
 
 #[cfg(test)]
