@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
+mod at_once;
 mod batch;
-mod diagnose;
 mod examples;
 mod export;
 mod new;
@@ -15,8 +15,8 @@ mod plugins;
 mod provenance;
 mod submit;
 
+pub use at_once::{AtOnceArgs, ModesArgs};
 pub use batch::{BatchArgs, SetsArgs};
-pub use diagnose::DiagnoseArgs;
 pub use examples::command;
 pub use export::{ExportArgs, ExportFormat, ModelFormat, ShapeFormat};
 pub use new::{Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordingsArgs, RecordsAre};
@@ -48,9 +48,11 @@ pub enum Command {
         #[command(subcommand)]
         to: SubmitTo,
     },
+    /// From recordings to their modes: config, result and page are written side by side, the table is printed.
+    Modes(ModesArgs),
     /// From recordings to a verdict on the linear model: config, result and page are written side by side, the verdict is
     /// printed.
-    Diagnose(DiagnoseArgs),
+    Diagnose(AtOnceArgs),
     /// Begin something of your own.
     New {
         /// What.
@@ -215,6 +217,7 @@ impl Command {
             Self::Run(_)
                 | Self::Batch(_)
                 | Self::Rerun(_)
+                | Self::Modes(_)
                 | Self::Diagnose(_)
                 | Self::New { .. }
                 | Self::Inspect { .. }

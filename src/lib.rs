@@ -35,6 +35,7 @@ use afmid_pipeline::runner::Observer;
 use afmid_pipeline::stage::DoubleName;
 use afmid_pipeline::{InputFiles, Registry, RunResult};
 use clap::FromArgMatches;
+use clap::error::{ContextKind, ContextValue};
 
 #[doc(hidden)]
 pub use commands::doors;
@@ -71,7 +72,7 @@ pub fn exit_code(registry: &Registry) -> u8 {
             Some((problem, help)) => Err(Failure::failed(problem, Some(help))),
             None => commands::dispatch(cli.command, registry),
         },
-        Err(error) => help_or_mistake(&error),
+        Err(error) => recordings_alone(&error).map_or_else(|| help_or_mistake(&error), Err),
     };
     interrupt::check().and(done).map_or_else(output::report, |()| 0)
 }
@@ -102,6 +103,24 @@ pub fn run_here(
 /// How a program ends whose stages do not make a registry.
 pub fn fail(error: &DoubleName) -> ExitCode {
     ExitCode::from(output::report(Failure::failed(error, None)))
+}
+
+/// What to do with a path that stands where a command should; none of anything else.
+fn recordings_alone(error: &clap::Error) -> Option<Failure> {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else { return None };
+    let path = Path::new(word);
+    path.exists().then(|| {
+        let quoted = batch::shell::quoted(path);
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        let help = match ending {
+            "toml" => format!("`afmid run {quoted}` runs a config"),
+            _ => format!(
+                "of recordings: `afmid modes {quoted}` finds their modes, `afmid diagnose {quoted}` what a linear model gets \
+                 wrong, `afmid inspect {quoted}` says what they hold; of a result `afmid show {quoted}`"
+            ),
+        };
+        Failure::usage(format!("{} stands where a command should", path.display()), Some(help))
+    })
 }
 
 /// Help and version go to stdout, mistakes to stderr, in colour if a person looks at them and nothing that they typed

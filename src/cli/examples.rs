@@ -47,6 +47,18 @@ faults, submit again: what is finished is not run again.",
     },
     help(&["submit"], &["afmid submit slurm ringdown.toml --manifest levers.jsonl --shards 8 -o results"]),
     Help {
+        command: &["modes"],
+        examples: &[
+            "afmid modes hit.csv --rate 5000 --unit m/s^2",
+            "afmid modes archive/2004 -o 2004.h5",
+            "afmid modes bench.mat --input u --channel y --rate 610 --json",
+            "afmid modes plate.uff --goal frf",
+        ],
+        further: "\
+Looked at are free decays, snap-offs of a lever, a measured input and output, a hammer's hits, frequency responses, thermal noise and a steady oscillation. Written is the
+config of `afmid new pipeline RECORDINGS`; change it and `afmid run` it for more. In the table `?` marks what the data do not bear out. Exit codes are those of `run`.",
+    },
+    Help {
         command: &["diagnose"],
         examples: &[
             "afmid diagnose archive/2004",

@@ -1,5 +1,6 @@
 //! One file per command: each turns arguments into a call of the engine, and its answer into text.
 
+mod at_once;
 mod batch;
 mod causes;
 mod check;
@@ -20,6 +21,7 @@ mod graph;
 mod inspect;
 mod load;
 mod man;
+mod modes;
 mod new;
 mod open;
 mod plugin;
@@ -64,6 +66,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::ExportCrate(args) => export_crate::run(&args),
         Command::Gc(args) => gc::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Modes(args) => modes::run(&args, registry),
         Command::Diagnose(args) => diagnose::run(&args, registry),
         Command::New { what } => new::run(&what, registry),
         Command::Check { configs, json } => check::run(&configs, json, &planning(registry, &consent::none())),

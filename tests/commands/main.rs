@@ -15,6 +15,7 @@ mod errors;
 mod example;
 mod kinds;
 mod measurement;
+mod modes;
 mod plugins;
 mod provenance;
 mod python_reader;
