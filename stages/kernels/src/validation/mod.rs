@@ -1,4 +1,5 @@
-//! How good a model is: fit of held-out records, whiteness of residuals, bootstrap intervals, comparison of two models.
+//! How good a model is: fit of held-out records, whiteness of residuals, feedback, bootstrap intervals, comparison of two
+//! models.
 //!
 //! ```
 //! use afmid_kernels::pem::{Experiment, PemOptions, identify};
@@ -32,6 +33,7 @@
 
 mod bootstrap;
 mod comparison;
+mod feedback;
 mod fit;
 mod order_choice;
 mod resampled;
@@ -41,6 +43,7 @@ mod single_sine;
 
 pub use bootstrap::{BootstrapSettings, Bootstrapped, bootstrap};
 pub use comparison::{Frequency, PoleShift, ZeroPair, compare_zeros, pole_shifts};
+pub use feedback::{Driven, Feedback, feedback};
 pub use fit::{Nuisances, Simulation, fit_percent, noise_ceiling_percent, simulate_held_out};
 pub use order_choice::{OrderCandidate, OrderChoice, choose_order, largest_gap};
 pub use resampled::{Drawing, Intervals, RootInterval};
