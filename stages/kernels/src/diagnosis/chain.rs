@@ -7,9 +7,11 @@ use std::ops::Range;
 use super::data::{Bench, Part, Record};
 use super::fit::paired;
 use super::options::DiagnosisOptions;
+use super::ruling::{FOLLOWS, follows_output};
 use super::verdict::{Diagnosis, Gain, NamedCause, Rung, Validation, Value, Verdict};
 use crate::Unwatched;
 use crate::block_oriented::{BlockFit, BlockModel, BlockOptions, Structure, fit_block_oriented};
+use crate::validation::{Driven, feedback};
 
 /// Fewest samples: some twenty parameters, each with a hundred.
 const LEAST: usize = 2000;
@@ -104,6 +106,17 @@ pub(super) fn chain(
         ));
         return None;
     }
+    let made = simulated.get(stretch.first..stretch.end)?;
+    let (input, output_there) =
+        (record.input.get(stretch.first..stretch.end)?, output.get(stretch.first..stretch.end)?);
+    let left: Vec<f64> = output_there.iter().zip(made).map(|(y, made)| y - made).collect();
+    let test = feedback(&[Driven { input, others: &[], response: made, left: &left }]);
+    if let Some(said) = follows_output(&[test], options.false_alarm_rate) {
+        if !diagnosis.evidence.iter().any(|line| line.starts_with(FOLLOWS)) {
+            diagnosis.evidence.push(said);
+        }
+        return None;
+    }
     write(diagnosis, &fit, options, [before, after], 1.0 / bench.interval_s);
     for part in &options.parts {
         let rms_after = rms(output, &simulated, 0, &scored(part));
@@ -111,7 +124,7 @@ pub(super) fn chain(
             validation.rms_after = rms_after;
         }
     }
-    let after = simulated.get(stretch.first..stretch.end)?.to_vec();
+    let after = made.to_vec();
     Some(Chain { after, whole: simulated, model: fit.model })
 }
 

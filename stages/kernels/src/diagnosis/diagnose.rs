@@ -11,6 +11,7 @@ use super::grounds::noise_loss;
 use super::lack_of_fit::misfit;
 use super::linear_only::{LinearOnly, halves, linear_only};
 use super::options::DiagnosisOptions;
+use super::ruling::{ALARMS_OF_LAW, FOLLOWS};
 use super::score_test::{Candidate, trials};
 use super::selection::{Choice, Search};
 use super::simulation::{ModalSimulation, Simulation};
@@ -122,8 +123,7 @@ pub fn diagnose(
         [&choice.ladder[0].fit, &last.fit],
         &blocks,
         &candidates(options, &bench, &last.fit.model),
-        // of alarms that come beside those of the causes
-        0.5 * options.false_alarm_rate,
+        ALARMS_OF_LAW * options.false_alarm_rate,
     );
     let first = &choice.ladder[0].fit;
     let linear = first.model.clone();
@@ -162,12 +162,18 @@ pub fn diagnose(
         && let Some(linear) = alone(&bench, records, options)
     {
         // where no model that causes could extend was found, this one decides
-        if unexplained && !diagnosis.baseline.adequate && linear.is_adequate(options.tolerated_misfit) {
+        if unexplained
+            && !diagnosis.baseline.adequate
+            && linear.is_adequate(options.tolerated_misfit, options.false_alarm_rate)
+        {
             let part = options.parts.first().map_or("held out", |part| &part.name[..]);
             diagnosis = linear.answer(part, &options.output_unit, options.tolerated_misfit, options.false_alarm_rate);
             after.clone_from(&before);
         } else {
             diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
+            let is_said = diagnosis.evidence.iter().any(|line| line.starts_with(FOLLOWS));
+            let follows = linear.follows_output(options.false_alarm_rate);
+            diagnosis.evidence.extend(follows.filter(|_| unexplained && !is_said));
         }
     }
     Ok(Diagnosed { diagnosis, output, before, after, story, simulation })

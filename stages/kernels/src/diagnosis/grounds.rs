@@ -1,14 +1,15 @@
 //! What the models of an input and an output, or of decays, have to say for a verdict.
 
 use super::answer::Findings;
-use super::data::Bench;
+use super::data::{Bench, Stretch};
 use super::dynamics::{Kind, Section};
 use super::fit::{Fit, Until};
-use super::ruling::{Claim, Grounds, high_band_variance, left_beyond_noise, left_repeating, repeats};
+use super::ruling::{Claim, Grounds, follows_output, high_band_variance, left_beyond_noise, left_repeating, repeats};
 use super::selection::Judged;
 use super::validation::{held_out, pooled_rms};
 use super::verdict::NamedCause;
 use crate::spectra::period_samples;
+use crate::validation::{Driven, Feedback, feedback};
 
 /// Nepers over the longest stretch below which nothing is known of a damping: of an error of a thousandth a share.
 const ENDLESS: f64 = 1e-3;
@@ -32,7 +33,7 @@ impl Findings<'_> {
             held_out: ends.map(|(before, after)| [before * before, after * after]),
             noise,
             against_clean: self.repeated().into_iter().chain(self.beyond_noise(noise)).collect(),
-            against_all: self.endless().into_iter().collect(),
+            against_all: self.endless().into_iter().chain(self.follows()).collect(),
         }
     }
 
@@ -74,6 +75,33 @@ impl Findings<'_> {
         let variance: f64 = parts.map(|part| about_mean(&self.bench.output[part])).sum();
         let left = self.rms(last.fit.loss)?.powi(2) - noise?;
         self.bench.driven.then(|| left_beyond_noise(left / self.rms(variance)?.powi(2))).flatten()
+    }
+
+    /// What says that a measured input follows the output, in a sentence; none where nothing does, and where what is left is
+    /// not what any linear model leaves.
+    fn follows(&self) -> Option<String> {
+        if !self.bench.driven || !self.adequate {
+            return None;
+        }
+        let tests: Vec<Option<Feedback>> =
+            (0..self.bench.layout.channels).map(|channel| self.feedback(channel)).collect();
+        follows_output(&tests, self.options.false_alarm_rate)
+    }
+
+    /// The last model's test for feedback from one channel.
+    fn feedback(&self, channel: usize) -> Option<Feedback> {
+        let (last, layout) = (&self.choice.ladder.last()?.fit, &self.bench.layout);
+        let one = |(e, stretch): (usize, &Stretch)| {
+            let part = layout.part(e, channel, 0, layout.samples(e));
+            Some(Driven {
+                input: self.records.get(stretch.record)?.input.get(stretch.first..stretch.end)?,
+                others: &[],
+                response: last.simulated.get(part.clone())?,
+                left: last.residual.get(part)?,
+            })
+        };
+        let stretches: Option<Vec<Driven<'_>>> = self.bench.stretches.iter().enumerate().map(one).collect();
+        feedback(&stretches?)
     }
 
     /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.

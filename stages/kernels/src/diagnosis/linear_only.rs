@@ -7,12 +7,12 @@ use super::data::{LEAST_SAMPLES, Layout, Stretch};
 use super::error::DiagnosisError;
 use super::fit::{Blocks, Moments};
 use super::lack_of_fit::{Misfit, RIDGE};
-use super::ruling::{Grounds, Ruling, high_band_variance, left_beyond_noise, left_repeating, repeats};
+use super::ruling::{Grounds, Ruling, follows_output, high_band_variance, left_beyond_noise, left_repeating, repeats};
 use super::verdict::{BaselineSummary, Diagnosis, Validation, Verdict};
 use crate::Monitor;
 use crate::pem::{Experiment, Focus, NoiseModel, PemOptions, identify};
 use crate::spectra::period_samples;
-use crate::validation::{Nuisances, choose_order, simulate_held_out};
+use crate::validation::{Driven, Feedback, Nuisances, choose_order, feedback, simulate_held_out};
 
 /// A linear model whose order the data chose, judged on samples that it was not fitted to.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,8 @@ pub struct LinearOnly {
     pub beyond_noise: Option<f64>,
     /// Power of that error that repeats itself with the inputs over what noise leaves of it; none where they do not.
     pub repeats: Option<f64>,
+    /// Whether each input follows the output; none where that cannot be tested.
+    pub feedback: Vec<Option<Feedback>>,
     /// What static terms of inputs, output and rate of the output still predict of that error.
     pub misfit: Misfit,
     /// Its simulation of what was held out.
@@ -48,12 +50,17 @@ const FOLLOWS: f64 = 10.0;
 
 impl LinearOnly {
     /// Whether it describes what was measured: the output follows from the inputs, no product of them predicts more
-    /// than is tolerated, and what was held out agrees.
-    pub fn is_adequate(&self, tolerated: f64) -> bool {
-        self.ruling(tolerated).verdict == Verdict::Clean
+    /// than is tolerated, no input follows the output, and what was held out agrees.
+    pub fn is_adequate(&self, tolerated: f64, false_alarm_rate: f64) -> bool {
+        self.ruling(tolerated, false_alarm_rate).verdict == Verdict::Clean
     }
 
-    fn ruling(&self, tolerated: f64) -> Ruling {
+    /// What says that an input follows the output, in a sentence; none where nothing does.
+    pub fn follows_output(&self, false_alarm_rate: f64) -> Option<String> {
+        follows_output(&self.feedback, false_alarm_rate)
+    }
+
+    fn ruling(&self, tolerated: f64, false_alarm_rate: f64) -> Ruling {
         let beyond = self.beyond_noise.and_then(left_beyond_noise);
         let against = beyond.into_iter().chain(self.repeats.and_then(left_repeating)).collect();
         let grounds = Grounds {
@@ -62,6 +69,7 @@ impl LinearOnly {
             training: Some(self.training_rms.powi(2)),
             held_out: Some([self.rms.powi(2); 2]),
             against_clean: against,
+            against_all: self.follows_output(false_alarm_rate).into_iter().collect(),
             ..Grounds::default()
         };
         grounds.ruling(&|_| None)
@@ -71,7 +79,7 @@ impl LinearOnly {
     ///
     /// `part`: name of what was held out.
     pub fn answer(&self, part: &str, unit: &str, tolerated: f64, false_alarm_rate: f64) -> Diagnosis {
-        let Ruling { verdict, because, .. } = self.ruling(tolerated);
+        let Ruling { verdict, because, .. } = self.ruling(tolerated, false_alarm_rate);
         let adequate = verdict == Verdict::Clean;
         let noise = self.rms * (1.0 - self.misfit.share()).sqrt();
         Diagnosis {
@@ -170,7 +178,7 @@ pub fn linear_only(
         }
     };
     let learnt = learnt.start..learnt.end.min(learnt.start + SAMPLES);
-    let (u, y) = cut("training", learnt)?;
+    let (u, y) = cut("training", learnt.clone())?;
     let experiment = Experiment { input: &u, output: y };
     let options = PemOptions {
         block_rows: 2 * MOST + 4,
@@ -184,6 +192,8 @@ pub fn linear_only(
     let choice = choose_order(experiment, interval_s, MOST, &options, monitor).map_err(wrong)?;
     let options = PemOptions { order: choice.order, ..options };
     let fit = identify(&[experiment], interval_s, &options).map_err(wrong)?;
+    let apart = held_out.end <= learnt.start || learnt.end <= held_out.start;
+    let (learnt_u, learnt_y) = (u, y);
     let (u, y) = cut("held out", held_out)?;
     let nuisances = Nuisances { offset: true, slope: false };
     let simulation = simulate_held_out(&fit.model, &fit.further_inputs, &u, y, nuisances).map_err(wrong)?;
@@ -198,7 +208,15 @@ pub fn linear_only(
     let all: Vec<&[f64]> = u.chunks(y.len().max(1)).collect();
     let left = fit.residuals.iter().flatten().filter(|e| e.is_finite());
     let (sum, count) = left.fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
+    let residual = fit.residuals.first().map_or(&[][..], Vec::as_slice);
+    let made = learnt_y.iter().enumerate().map(|(k, y)| y - residual.get(k).copied().unwrap_or(f64::NAN)).collect();
+    let mut runs = vec![Run::new(learnt_u, learnt_y, made)];
+    // samples that were fitted and judged count once
+    if apart {
+        runs.push(Run::new(u.clone(), y, simulated.clone()));
+    }
     Ok(LinearOnly {
+        feedback: follows(inputs.len(), &runs),
         order: fit.model.order(),
         fit_percent: simulation.fit_percent,
         rms,
@@ -208,6 +226,39 @@ pub fn linear_only(
         misfit,
         simulated,
     })
+}
+
+/// What a model makes of inputs one after the other, and what that leaves of an output.
+struct Run {
+    inputs: Vec<f64>,
+    response: Vec<f64>,
+    left: Vec<f64>,
+}
+
+impl Run {
+    fn new(inputs: Vec<f64>, output: &[f64], response: Vec<f64>) -> Self {
+        let left = output.iter().zip(&response).map(|(y, made)| y - made).collect();
+        Self { inputs, response, left }
+    }
+}
+
+/// Tests of each of so many inputs for feedback.
+fn follows(inputs: usize, runs: &[Run]) -> Vec<Option<Feedback>> {
+    let one = |which: usize| {
+        let split = |run: &Run| -> (Vec<f64>, Vec<Vec<f64>>) {
+            let mut all: Vec<Vec<f64>> = run.inputs.chunks(run.left.len().max(1)).map(<[f64]>::to_vec).collect();
+            (all.remove(which), all)
+        };
+        let split: Vec<(Vec<f64>, Vec<Vec<f64>>)> = runs.iter().map(split).collect();
+        let others: Vec<Vec<&[f64]>> = split.iter().map(|(_, u)| u.iter().map(Vec::as_slice).collect()).collect();
+        let driven: Vec<Driven<'_>> = runs
+            .iter()
+            .zip(split.iter().zip(&others))
+            .map(|(run, ((input, _), others))| Driven { input, others, response: &run.response, left: &run.left })
+            .collect();
+        feedback(&driven)
+    };
+    (0..inputs).map(one).collect()
 }
 
 /// What products of inputs, output and rate predict of an error beyond what they themselves do.
@@ -304,9 +355,35 @@ mod tests {
             }
             let half = SAMPLES / 2;
             let found = linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model");
-            assert!(found.fit_percent > 50.0 && !found.is_adequate(0.25), "{seed}: {found:?}");
+            assert!(found.fit_percent > 50.0 && !found.is_adequate(0.25, 0.01), "{seed}: {found:?}");
             let answer = found.answer("held out", "V", 0.25, 0.01);
             assert!(answer.evidence.iter().any(|line| line.contains("beyond the noise")), "{:?}", answer.evidence);
+        }
+    }
+
+    /// One input that a controller makes of a sensor's noise and all, beside one from outside.
+    #[test]
+    fn an_input_that_follows_the_output_is_no_clean_record() {
+        for seed in 0..4 {
+            let mut rng = ChaCha8Rng::seed_from_u64(300 + seed);
+            let mut white = || -> f64 { StandardNormal.sample(&mut rng) };
+            let (mut a, mut reference) = ([0.0; 2], 0.0);
+            let (mut u, mut v, mut output) = (Vec::new(), Vec::new(), Vec::new());
+            for _ in 0..SAMPLES {
+                let seen = a[0] + 0.3 * white();
+                reference = 0.9 * reference + 0.4 * white();
+                output.push(seen);
+                u.push(reference - 0.3 * seen);
+                v.push(white());
+                let next = 1.6 * a[0] - 0.9 * a[1] + 0.5 * u[u.len() - 1] + 0.2 * v[v.len() - 1];
+                a = [next, a[0]];
+            }
+            let half = SAMPLES / 2;
+            let found = linear_only(&[&u, &v], &output, 0..half, half..SAMPLES, 1.0, &Unwatched).expect("a model");
+            let level = 0.01;
+            assert!(!found.is_adequate(0.25, level) && found.is_adequate(0.25, 0.0), "{seed}: {found:?}");
+            let answer = found.answer("held out", "V", 0.25, level);
+            assert!(answer.evidence.iter().any(|line| line.starts_with("the input follows")), "{:?}", answer.evidence);
         }
     }
 
@@ -314,11 +391,11 @@ mod tests {
     fn linear_systems_of_two_inputs_are_adequate_and_a_bent_sensor_is_seen() {
         for seed in 0..6 {
             let linear = judged(seed, 0.0);
-            assert!(linear.is_adequate(0.25), "{seed}: {linear:?}");
+            assert!(linear.is_adequate(0.25, 0.01), "{seed}: {linear:?}");
             // noise of 0.3 beside a signal of about 3
             assert!(linear.fit_percent > 80.0 && (4..=6).contains(&linear.order), "{seed}: {linear:?}");
             let bent = judged(seed, 0.04);
-            assert!(!bent.is_adequate(0.25), "{seed}: {:?} {}", bent.misfit, bent.fit_percent);
+            assert!(!bent.is_adequate(0.25, 0.01), "{seed}: {:?} {}", bent.misfit, bent.fit_percent);
         }
     }
 }

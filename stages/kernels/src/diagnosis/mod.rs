@@ -24,6 +24,8 @@ mod data;
 mod diagnose;
 mod dynamics;
 mod error;
+#[cfg(test)]
+mod feedback_tests;
 mod fit;
 mod general_laws;
 mod grounds;

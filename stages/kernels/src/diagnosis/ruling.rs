@@ -1,6 +1,7 @@
 //! What follows from errors, noise, tests and names: one rule for every kind of data.
 
 use super::verdict::Verdict;
+use crate::validation::Feedback;
 
 /// Share of what a model leaves beyond noise that a name has to take of the squared error at least. Why: what takes less
 /// may stand for a part of what is left, whatever that is; half, since names beside one another do some of each other's
@@ -17,6 +18,30 @@ const AGREES: f64 = 4.0;
 const BEYOND: f64 = 0.02;
 /// Power that repeats itself with the input over that of noise, from which on it is more than a model may leave.
 const REPEATS: f64 = 2.0;
+
+/// Share of the rate of false alarms that feedback has, and an unnamed law. Why: both come beside the causes, together with
+/// half of their rate; a loop that matters is far beyond chance.
+pub(super) const ALARMS_OF_FEEDBACK: f64 = 0.1;
+pub(super) const ALARMS_OF_LAW: f64 = 0.4;
+
+/// What begins a sentence about feedback.
+pub(super) const FOLLOWS: &str = "the input follows the output";
+
+/// What speaks against any answer where an input follows the output, by the clearest of several tests that share the alarms
+/// of feedback; none if it does not.
+pub(super) fn follows_output(tests: &[Option<Feedback>], false_alarm_rate: f64) -> Option<String> {
+    let level = ALARMS_OF_FEEDBACK * false_alarm_rate / tests.len().max(1) as f64;
+    let found =
+        tests.iter().flatten().filter(|test| test.is_found(level)).min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+    Some(format!(
+        "{FOLLOWS}: what the model left before predicts {:.1} % of what the input's own past does not (p = {:.1e}, level \
+         {level:.1e}), and {:.1} % of the input goes with it; in a loop estimates of an open one are wrong: give the loop's \
+         `reference`, measure with the loop open, or drive by a signal that does not depend on the output",
+        100.0 * found.share,
+        found.p_value,
+        100.0 * found.of_input
+    ))
+}
 
 /// What speaks against a linear model that leaves this share of the output's variance beyond noise; none if it may.
 pub fn left_beyond_noise(share: f64) -> Option<String> {
