@@ -206,7 +206,7 @@ impl Loop {
     }
 }
 
-/// Loops in which noise makes a tenth of the input's power, and, where reference and noise are alike, a third.
+/// Loops in which noise makes a tenth of the input's power, three tenths where a drift meets a white reference.
 #[test]
 fn loops_are_found() {
     type Make = fn(&[f64], &[f64]) -> Loop;
