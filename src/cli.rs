@@ -104,6 +104,15 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Show the modes of several results beside one another, and how far they differ in standard errors.
+    Compare {
+        /// The result files, two at least; changes are from the first that has a mode.
+        #[arg(required = true, num_args = 2.., value_name = "RESULT")]
+        results: Vec<PathBuf>,
+        /// As JSON, alone on stdout.
+        #[arg(long)]
+        json: bool,
+    },
     /// Say what differs between two result files: inputs, parameters, versions, results.
     Diff(DiffArgs),
     /// Go back from a number to the stages, parameters and files that it comes from.

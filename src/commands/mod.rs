@@ -4,6 +4,7 @@ mod at_once;
 mod batch;
 mod causes;
 mod check;
+mod compare;
 mod completions;
 mod consent;
 mod diagnose;
@@ -59,6 +60,7 @@ pub fn dispatch(command: Command, registry: &Registry) -> Result<(), Failure> {
         Command::Explain(args) => explain::run(&args, &planning(registry, &consent::none())),
         Command::Inspect { files, resample, json } => inspect::run(&files, resample, json),
         Command::Show { result, id, json } => show::run(&result, id.as_deref(), json),
+        Command::Compare { results, json } => compare::run(&results, json),
         Command::Diff(args) => diff::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Rerun(args) => starting(&args.plugins, None, registry, |stages| rerun::run(&args, stages)),

@@ -13,14 +13,15 @@ const ROWS: usize = 12;
 /// Factor of a variance from which on a row is doubtful: an error twice that of the noise.
 const WIDENED: f64 = 4.0;
 
-/// A row of the table.
-struct Row {
+/// A mode as a stage's summary has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
     /// Of which record and channel, where there are several.
-    of: String,
+    pub of: String,
     /// Frequency in Hz, quality factor, damping in per cent, each with its standard error.
-    numbers: [[Option<f64>; 2]; 3],
+    pub numbers: [[Option<f64>; 2]; 3],
     /// The factor by which its variance is larger than that of noise.
-    lack_of_fit: f64,
+    pub lack_of_fit: f64,
 }
 
 /// A stage's modes as a table, a line each; the doubtful rows have a mark, which is explained below them. Oscillations that
@@ -59,11 +60,12 @@ pub fn moves(summary: &Value) -> bool {
     course.into_iter().flatten().any(|mode| mode.get("moves") == Some(&Value::Bool(true)))
 }
 
-/// What decides whether a number says anything.
-const NAMES: [&str; 3] = ["frequency_hz", "quality_factor", "damping_ratio"];
+/// What the numbers of a row are, for whether they say anything.
+pub const NAMES: [&str; 3] = ["frequency_hz", "quality_factor", "damping_ratio"];
 
 impl Row {
-    fn is_doubtful(&self) -> bool {
+    /// Whether the data do not bear it out: a number is not determined, or an error is widened far beyond noise.
+    pub fn is_doubtful(&self) -> bool {
         let known = |(name, [value, std]): (&&str, &[Option<f64>; 2])| {
             value.is_none_or(|value| says(name, value, std.unwrap_or(f64::NAN)))
         };
@@ -71,7 +73,8 @@ impl Row {
     }
 }
 
-fn cell(name: &str, [value, std]: &[Option<f64>; 2]) -> String {
+/// A number of that name with its error.
+pub fn cell(name: &str, [value, std]: &[Option<f64>; 2]) -> String {
     match (value, std) {
         (Some(value), Some(std)) => named_with_std(name, *value, *std),
         (value, _) => value.map_or_else(|| "-".to_owned(), number),
@@ -79,7 +82,7 @@ fn cell(name: &str, [value, std]: &[Option<f64>; 2]) -> String {
 }
 
 /// The modes of a stage's summary, the resonance of a thermal spectrum, or oscillations.
-fn rows(summary: &Value) -> Vec<Row> {
+pub fn rows(summary: &Value) -> Vec<Row> {
     let list = |name: &str| summary.get(name).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
     let lack = list("lack_of_fit");
     let row = |(number, mode): (usize, &Value)| {

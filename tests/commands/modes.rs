@@ -90,6 +90,35 @@ fn a_mode_that_moves_leads_on_to_the_diagnosis() {
 }
 
 #[test]
+fn results_stand_beside_one_another() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    for (name, seed) in [("monday", 6), ("tuesday", 7)] {
+        table(here, &format!("{name}.csv"), "acceleration (m/s^2)", &two_modes(seed));
+        let result = format!("{name}.h5");
+        afmid(here, &["modes", &format!("{name}.csv"), "-o", &result, "--cache", "cache"]);
+    }
+    let text = afmid(here, &["compare", "monday.h5", "tuesday.h5"]);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines.len() == 5 && lines[0].contains("in errors"), "{text}");
+    assert!(lines[1].contains("monday.h5") && lines[2].contains("tuesday.h5"), "{text}");
+    let found: Value =
+        serde_json::from_str(&afmid(here, &["compare", "monday.h5", "tuesday.h5", "--json"])).expect("JSON");
+    assert_eq!((&found["results"][1], found["modes"].as_array().map(Vec::len)), (&"tuesday.h5".into(), Some(2)));
+    for mode in found["modes"].as_array().expect("modes") {
+        assert_eq!(mode[0]["frequency_z"], 0.0);
+        // the same structure with other noise: by chance once in 16,000
+        assert!(mode[1]["frequency_z"].as_f64().expect("a number").abs() < 4.0, "{found:#}");
+        assert_eq!(mode[1]["doubtful"], false);
+    }
+    let output = common::command(here, &["compare", "monday.h5"]).output().expect("afmid starts");
+    assert_eq!(output.status.code(), Some(2));
+    let output = common::command(here, &["compare", "monday.h5", "monday.csv"]).output().expect("afmid starts");
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && error.contains("wanted a result file"), "{error}");
+}
+
+#[test]
 fn what_is_no_modes_is_said() {
     let scratch = tempfile::tempdir().expect("a folder");
     let here = scratch.path();
