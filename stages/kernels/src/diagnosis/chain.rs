@@ -37,7 +37,7 @@ pub(super) struct Chain {
 /// names nothing; none where no chain accounts for the data.
 ///
 /// # Method
-/// [`fit_block_oriented`] with every structure that may be named. It is judged on the first part, or on the last quarter
+/// [`fit_block_oriented`] with every structure; the one that is chosen has to be one that may be named. It is judged on the first part, or on the last quarter
 /// of the stretch, which then takes no share in the fit. There its error is below that of the linear model by [`SHARE`] and
 /// below that of the extended model: where causes describe the data as well, no curve is named beside them.
 ///
@@ -55,10 +55,8 @@ pub(super) fn chain(
     if diagnosis.verdict != Verdict::Unexplained || !single || stretch.samples() < LEAST {
         return None;
     }
-    let structures: Vec<Structure> = Structure::ALL
-        .into_iter()
-        .filter(|structure| options.candidates.iter().any(|cause| cause.about().id == id(*structure)))
-        .collect();
+    let may_be_named =
+        |structure: &Structure| options.candidates.iter().any(|cause| cause.about().id == id(*structure));
     let held_out = options.parts.first();
     let learnt = match held_out {
         Some(_) => stretch.first..stretch.end,
@@ -66,12 +64,13 @@ pub(super) fn chain(
     };
     let judged = held_out.map_or(learnt.end..stretch.end, scored);
     let (u, y) = (record.input.get(learnt.clone())?, output.get(learnt.clone())?);
-    if structures.is_empty() || y.iter().any(|y| !y.is_finite()) {
+    if !Structure::ALL.iter().any(may_be_named) || y.iter().any(|y| !y.is_finite()) {
         return None;
     }
     // nothing is known of what was put in before: the start is simulated and not scored
     let transient = (u.len() / 20).min(1000);
-    let wanted = BlockOptions { structures, transient, ..BlockOptions::default() };
+    // all structures: one that may not be named is no reason for the name of a more general one
+    let wanted = BlockOptions { structures: Structure::ALL.to_vec(), transient, ..BlockOptions::default() };
     let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
     let end = options.parts.iter().map(|part| part.stretch.end).fold(judged.end.max(stretch.end), usize::max);
     let simulated = fit.model.simulate(record.input.get(..end)?);
@@ -84,6 +83,8 @@ pub(super) fn chain(
         }
         None => (rms(output, linear, stretch.first, &judged)?, rms(output, extended, stretch.first, &judged)?),
     };
+    // the best linear model's error, wherever it was met: a baseline that causes extend may be far from it
+    let before = before.min(fit.linear_rms);
     let after = rms(output, &simulated, 0, &judged)?;
     let bend = fit.curve_strength();
     let sure = bend.relative > SIGNIFICANT * bend.std && significant(output, &simulated, before, &judged);
@@ -93,6 +94,14 @@ pub(super) fn chain(
         diagnosis.evidence.push(format!(
             "linear parts and a static curve ({}) account for {share:.0} % of the squared error of the linear model on \
              what did not choose them: not enough to be named",
+            id(fit.structure)
+        ));
+        return None;
+    }
+    if !may_be_named(&fit.structure) {
+        diagnosis.evidence.push(format!(
+            "linear parts and a static curve ({}) account for the squared error of the linear model on what did not choose \
+             them, and that cause is left out",
             id(fit.structure)
         ));
         return None;
