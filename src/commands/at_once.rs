@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::files::read_regular;
+use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Registry, RunResult, StageRecord};
 use serde_json::{Map, Value, json};
 
@@ -29,7 +30,7 @@ pub struct Answered {
 pub fn answered(args: &AtOnceArgs, goal: Option<Goal>, kind: &str, registry: &Registry) -> Result<Answered, Failure> {
     let files = Files::of(args, kind)?;
     let draft = Draft::new(&args.recordings, goal, |_| Ok(files.config.clone()), registry)?;
-    let is_there = is_the_same(&draft)?;
+    let is_there = is_the_same(&draft, &files)?;
     let read = inputs(&draft.plan, &files.config);
     prepare(&files.result, Target::Result, &read)?;
     prepare(&files.page, Target::Page, &read)?;
@@ -40,8 +41,10 @@ pub fn answered(args: &AtOnceArgs, goal: Option<Goal>, kind: &str, registry: &Re
     let cache = open_cache(args.cache.as_deref());
     let base = draft.plan.config.base();
     let how = Computation { base, cache: &cache, fresh: args.fresh, jobs: args.jobs, overrides: &[] };
-    run_and_write(&draft.plan, &files.result, &how)
-        .inspect_err(|_| say(&format!("the config is {}\n", shown(&files.config))))?;
+    run_and_write(&draft.plan, &files.result, &how).inspect_err(|_| {
+        let taken = if draft.why.is_empty() { String::new() } else { format!("taken for: {}\n", one_line(&draft.why)) };
+        say(&format!("{taken}the config is {}\n", shown(&files.config)));
+    })?;
     let result = write_page(&files.result, &files.page)?;
     Ok(Answered { draft, files, result })
 }
@@ -73,7 +76,9 @@ impl Answered {
 
     /// What was found, then where config, result and page are, a line each.
     pub fn text(&self, found: impl Iterator<Item = String>) -> String {
-        let why = Some(self.draft.why.clone()).filter(|why| !why.is_empty());
+        let count = self.draft.recordings;
+        let why = Some(&self.draft.why).filter(|why| !why.is_empty());
+        let why = why.map(|why| if count > 1 { format!("{count} files; {why}") } else { why.clone() });
         let files = [&self.files.config, &self.files.result, &self.files.page].map(|path| path.display().to_string());
         why.into_iter().chain(found).chain(files).map(|line| one_line(&line) + "\n").collect()
     }
@@ -126,14 +131,24 @@ fn stem(args: &AtOnceArgs) -> String {
 /// Largest config that is compared.
 const MOST_BYTES: u64 = 8 << 20;
 
-/// Whether the config is there as it would be written. Errors, usage: another file is.
-fn is_the_same(draft: &Draft) -> Result<bool, Failure> {
+/// Whether the config is there as it would be written; one that the result beside it was made with, and that nobody has
+/// changed since, is written anew. Errors, usage: another file is there.
+fn is_the_same(draft: &Draft, files: &Files) -> Result<bool, Failure> {
     let path = &draft.path;
     if path.symlink_metadata().is_err() {
         return Ok(false);
     }
-    if read_regular(path, MOST_BYTES).is_ok_and(|bytes| bytes == draft.text.as_bytes()) {
+    let bytes = read_regular(path, MOST_BYTES);
+    if bytes.as_ref().is_ok_and(|bytes| bytes == draft.text.as_bytes()) {
         return Ok(true);
+    }
+    let results = [files.result.clone(), files.result.with_extension("failed.h5")];
+    let made_with = |result: &PathBuf| {
+        let config = ResultFile::open(result).ok().map(|file| file.run().config.clone());
+        bytes.as_ref().is_ok_and(|bytes| config.is_some_and(|config| config.as_bytes() == &bytes[..]))
+    };
+    if results.iter().any(made_with) {
+        return Ok(false);
     }
     let problem = format!("{} is there already, and is not what would be written", path.display());
     let help = format!("choose another name with -o, or remove it; `afmid run {}` runs it as it is", quoted(path));

@@ -1,14 +1,16 @@
 //! `afmid modes`: from recordings to their modes.
 
+use std::path::Path;
+
 use afmid_pipeline::Registry;
 use serde_json::{Value, json};
 
 use super::at_once::answered;
 use crate::batch::shell::quoted;
-use crate::cli::{Goal, ModesArgs};
+use crate::cli::{Goal, ModesArgs, RecordingsArgs, RecordsAre};
 use crate::failure::Failure;
 use crate::output::print;
-use crate::show::{mode_lines, moves, pretty};
+use crate::show::{Row, mode_lines, moves, pretty, rows};
 
 /// What config, result and page are called by.
 const KIND: &str = "modes";
@@ -27,8 +29,12 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
     if args.at_once.json {
         let mut all = answered.as_json(found);
         if let Value::Object(all) = &mut all {
+            let listed = rows(found);
             all.insert("goal".to_owned(), json!(answered.draft.goal));
             all.insert("warnings".to_owned(), json!(warnings));
+            all.insert("doubtful".to_owned(), listed.iter().map(Row::is_doubtful).collect());
+            // a resonance and an oscillation are modes for whoever asks for them
+            all.entry("modes").or_insert_with(|| listed.iter().map(Row::as_json).collect());
         }
         return print(&pretty(&all)?);
     }
@@ -37,10 +43,33 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
         1 => ", and a warning".to_owned(),
         count => format!(", and {count} warnings"),
     };
-    let next = format!("all numbers{more}: afmid show {} {last}", quoted(&answered.files.result));
+    let next = format!("all numbers{more}: afmid show {} {last}", path_word(&answered.files.result));
     let nonlinear = moves(found).then(|| {
-        let paths = args.at_once.recordings.paths.iter().map(quoted).collect::<Vec<String>>().join(" ");
-        format!("a mode that moves is not linear; what by: afmid diagnose {paths}")
+        format!("a mode that moves is not linear; what by: afmid diagnose {}", words(&args.at_once.recordings))
     });
     print(&answered.text(mode_lines(found).into_iter().chain([next]).chain(nonlinear)))
+}
+
+/// A path as a word that no shell and no command reads as anything else.
+fn path_word(path: &Path) -> String {
+    if path.to_string_lossy().starts_with('-') { quoted(Path::new(".").join(path)) } else { quoted(path) }
+}
+
+/// Recordings and what was said of them, to be typed again.
+fn words(args: &RecordingsArgs) -> String {
+    let mut all: Vec<String> = args.paths.iter().map(|path| path_word(path)).collect();
+    let mut add = |flag: &str, value: &str| all.extend([flag.to_owned(), quoted(value)]);
+    args.channel.iter().for_each(|name| add("--channel", name));
+    args.input.iter().for_each(|name| add("--input", name));
+    args.reference.iter().for_each(|name| add("--reference", name));
+    let records_are = args.records_are.map(|what| match what {
+        RecordsAre::Hits => "hits",
+        RecordsAre::Sensors => "sensors",
+        RecordsAre::Points => "points",
+    });
+    records_are.iter().for_each(|what| add("--as", what));
+    args.rate.iter().for_each(|rate| add("--rate", &rate.to_string()));
+    args.unit.iter().for_each(|unit| add("--unit", unit));
+    all.extend(args.resample.then(|| "--resample".to_owned()));
+    all.join(" ")
 }

@@ -234,7 +234,9 @@ fn summary(result: &RunResult) -> String {
 pub fn default_output(name: &str) -> PathBuf {
     let keep = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '-' };
     let name: String = name.chars().map(keep).collect();
-    PathBuf::from(format!("{}.h5", name.trim_start_matches('.')))
+    // a name that begins with a dash would be an option where it is typed again
+    let name = name.trim_start_matches(['.', '-']);
+    PathBuf::from(format!("{}.h5", if name.is_empty() { "result" } else { name }))
 }
 
 /// What a run reads: its config and the files of its stages.

@@ -205,7 +205,10 @@ fn kind((path, given): &Listed, wanted: &Wanted<'_>, files: &InputFiles) -> Resu
         Ok(opened) => opened,
         Err(error) if *given => return Err((format!("{}: {}", path.display(), error.problem), error.help)),
         Err(error) if recognised(path) => return Ok(Kind::None(error.problem)),
-        Err(_) => return Ok(Kind::None("of no format that is known".to_owned())),
+        Err(_) => {
+            let closed = std::fs::File::open(path).err().map(|error| format!("cannot be read: {error}"));
+            return Ok(Kind::None(closed.unwrap_or_else(|| "of no format that is known".to_owned())));
+        }
     };
     let contents = &opened.contents;
     let longest = contents.channels.iter().map(|channel| channel.samples).max().unwrap_or_default();

@@ -24,7 +24,7 @@ pub struct Compared {
 type Line = Vec<Option<usize>>;
 
 /// Modes beside one another, those of the first result first; of each later result the pairs that are nearest.
-fn lines(results: &[Compared]) -> Vec<Line> {
+fn lines(results: &[&Compared]) -> Vec<Line> {
     let mut lines: Vec<Line> = Vec::new();
     for (place, result) in results.iter().enumerate() {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
@@ -55,7 +55,7 @@ fn lines(results: &[Compared]) -> Vec<Line> {
 }
 
 /// The frequency of a mode in the first result that has it.
-fn frequency_of(results: &[Compared], line: &Line) -> Option<f64> {
+fn frequency_of(results: &[&Compared], line: &Line) -> Option<f64> {
     let (result, mode) = results.iter().zip(line).find_map(|(result, mode)| mode.map(|mode| (result, mode)))?;
     result.modes[mode].numbers[0][0]
 }
@@ -67,25 +67,30 @@ fn in_errors([from, from_std]: [Option<f64>; 2], [to, to_std]: [Option<f64>; 2])
 }
 
 /// A table with a line for each mode of each result: its numbers, and how far they are from those of the first result that
-/// has the mode, in standard errors; then the verdicts.
+/// has the mode, in standard errors; then verdicts, and what has no modes.
 pub fn compared_text(results: &[Compared]) -> String {
-    let head = ["mode", "result", "", "frequency (Hz)", "change", "in errors", "Q", "in errors"];
+    let head = ["mode", "result", "", "frequency (Hz)", "change", "in errors", "Q", "change in errors"];
+    let (with, without): (Vec<&Compared>, Vec<&Compared>) = results.iter().partition(|result| !result.modes.is_empty());
+    let mut doubtful = false;
     let mut cells = vec![head.map(str::to_owned).to_vec()];
-    for (number_of, line) in lines(results).iter().enumerate() {
+    for (number_of, line) in lines(&with).iter().enumerate() {
         let mut first: Option<&Row> = None;
-        for (result, mode) in results.iter().zip(line) {
+        for (result, mode) in with.iter().zip(line) {
             let name = one_line(&result.name);
             let mut row = vec![(number_of + 1).to_string(), name];
             match mode.map(|mode| &result.modes[mode]) {
                 None => row.extend(["", "none", "", "", "", ""].map(str::to_owned)),
                 Some(own) => {
                     let [f, q] = [0, 1].map(|k| cell(NAMES[k], &own.numbers[k]));
+                    // what is not borne out is no change
+                    let from = first.filter(|first| !first.is_doubtful() && !own.is_doubtful());
                     let errors = |k: usize| {
-                        let z = first.and_then(|first| in_errors(first.numbers[k], own.numbers[k]));
+                        let z = from.and_then(|from| in_errors(from.numbers[k], own.numbers[k]));
                         z.map_or_else(String::new, |z| format!("{z:+.1}"))
                     };
+                    doubtful |= own.is_doubtful();
                     let mark = if own.is_doubtful() { "?" } else { "" }.to_owned();
-                    row.extend([mark, f, change(first, own), errors(0), q, errors(1)]);
+                    row.extend([mark, f, change(from, own), errors(0), q, errors(1)]);
                     first = first.or(Some(own));
                 }
             }
@@ -93,6 +98,15 @@ pub fn compared_text(results: &[Compared]) -> String {
         }
     }
     let mut text = if cells.len() == 1 { "no mode in any of them\n".to_owned() } else { grid(&cells) };
+    if cells.len() > 1 {
+        text.push_str("change: from the first result that has the mode, in errors of both together\n");
+    }
+    if doubtful {
+        text.push_str("? not determined, or its errors at least doubled for what the fit leaves there\n");
+    }
+    for result in without {
+        text.push_str(&format!("{}: lists no modes\n", one_line(&result.name)));
+    }
     for result in results {
         if let Some(verdict) = &result.verdict {
             text.push_str(&format!("{}: {}\n", one_line(&result.name), one_line(verdict)));
@@ -118,7 +132,7 @@ fn signed(value: f64) -> String {
 
 /// The same for scripts: of each mode a list with an entry per result, null where it has none.
 pub fn compared_json(results: &[Compared]) -> Value {
-    let lines = lines(results);
+    let lines = lines(&results.iter().collect::<Vec<&Compared>>());
     let mode = |line: &Line| {
         let first = results.iter().zip(line).find_map(|(result, mode)| mode.map(|mode| &result.modes[mode]));
         let one = |(result, mode): (&Compared, &Option<usize>)| {
@@ -164,7 +178,7 @@ mod tests {
             result("c", &[(305.0, 80.0), (501.0, 90.0)]),
         ];
         assert_eq!(
-            lines(&results),
+            lines(&results.iter().collect::<Vec<&Compared>>()),
             [
                 vec![Some(0), Some(0), None],
                 vec![Some(1), Some(1), None],
@@ -189,6 +203,8 @@ mod tests {
         assert_eq!(lines[1], ["1", "a.h5", "100.00(10)", "50.0(10)"]);
         assert_eq!(lines[2], ["1", "b.h5", "99.90(10)", "-0.1", "%", "-0.7", "51.0(10)", "+0.7"]);
         assert_eq!(text.lines().last(), Some("b.h5: named: duffing"));
-        assert_eq!(compared_text(&[result("a", &[]), result("b", &[])]), "no mode in any of them\n");
+        let none = compared_text(&[result("a", &[]), result("b", &[])]);
+        assert_eq!(none, "no mode in any of them\na: lists no modes\nb: lists no modes\n");
+        assert!(text.contains("\nchange: from the first result that has the mode"), "{text}");
     }
 }

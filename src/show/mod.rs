@@ -22,7 +22,7 @@ pub use columns::columns;
 pub use compared::{Compared, compared_json, compared_text};
 pub use grid::grid;
 pub use json::artifact_json;
-pub use modes::{mode_lines, moves, rows};
+pub use modes::{Row, mode_lines, moves, rows};
 pub use number::{named_with_std, number};
 pub use overview::{overview_json, overview_text, stage_head};
 pub use pretty::pretty;

@@ -1,6 +1,6 @@
 //! Modes in a few lines.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::grid::grid;
 use super::number::{named_with_std, number};
@@ -49,7 +49,10 @@ pub fn mode_lines(summary: &Value) -> Vec<String> {
         lines.push(format!("... {} more", rows.len() - ROWS));
     }
     if doubtful {
-        lines.push("? not determined, or an error widened for what the fit leaves there".to_owned());
+        lines.push("? not determined, or its errors at least doubled for what the fit leaves there".to_owned());
+    }
+    if summary.get("converged") == Some(&Value::Bool(false)) {
+        lines.push("the fit has not settled: errors may be too small".to_owned());
     }
     lines
 }
@@ -64,6 +67,19 @@ pub fn moves(summary: &Value) -> bool {
 pub const NAMES: [&str; 3] = ["frequency_hz", "quality_factor", "damping_ratio"];
 
 impl Row {
+    /// As a summary lists a mode.
+    pub fn as_json(&self) -> Value {
+        let [f, q, damping] = self.numbers;
+        json!({
+            "frequency_hz": f[0],
+            "frequency_std_hz": f[1],
+            "quality_factor": q[0],
+            "quality_factor_std": q[1],
+            "damping_ratio": damping[0].map(|percent| 0.01 * percent),
+            "damping_ratio_std": damping[1].map(|percent| 0.01 * percent),
+        })
+    }
+
     /// Whether the data do not bear it out: a number is not determined, or an error is widened far beyond noise.
     pub fn is_doubtful(&self) -> bool {
         let known = |(name, [value, std]): (&&str, &[Option<f64>; 2])| {
@@ -118,7 +134,6 @@ fn damping_of([quality, std]: [Option<f64>; 2]) -> [Option<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn rows_that_the_data_do_not_bear_out_are_marked() {

@@ -91,6 +91,19 @@ fn a_mode_that_moves_leads_on_to_the_diagnosis() {
     let [stdout, _] = said(here, &["modes", "moving.csv", "-o", "m.h5", "--cache", "cache"]);
     assert!(stdout.contains("\na mode that moves is not linear; what by: afmid diagnose moving.csv\n"), "{stdout}");
     assert!(stdout.ends_with("m.toml\nm.h5\nm.html\n"), "{stdout}");
+    // what was said of the recording is said again; a config that the result was made with is no hindrance
+    let [stdout, _] = said(here, &["modes", "moving.csv", "--unit", "rad", "-o", "m.h5", "--cache", "cache"]);
+    assert!(stdout.contains("what by: afmid diagnose moving.csv --unit rad\n"), "{stdout}");
+    let changed = std::fs::read_to_string(here.join("m.toml")).expect("a config") + "# mine\n";
+    std::fs::write(here.join("m.toml"), &changed).expect("a config");
+    let output = common::command(here, &["modes", "moving.csv", "-o", "m.h5", "--cache", "cache"]).output();
+    assert_eq!(output.expect("afmid starts").status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(here.join("m.toml")).expect("a config"), changed);
+    // a name that begins with a dash is an option where it is typed
+    std::fs::rename(here.join("moving.csv"), here.join("-moving.csv")).expect("a recording");
+    let [stdout, _] = said(here, &["modes", "--cache", "cache", "--", "-moving.csv"]);
+    assert!(stdout.contains("afmid show moving.modes.h5 modes\n"), "{stdout}");
+    assert!(stdout.contains("what by: afmid diagnose ./-moving.csv\n"), "{stdout}");
 }
 
 #[test]
@@ -104,7 +117,7 @@ fn results_stand_beside_one_another() {
     }
     let text = afmid(here, &["compare", "monday.h5", "tuesday.h5"]);
     let lines: Vec<&str> = text.lines().collect();
-    assert!(lines.len() == 5 && lines[0].contains("in errors"), "{text}");
+    assert!(lines.len() == 6 && lines[0].contains("in errors") && lines[5].starts_with("change: "), "{text}");
     assert!(lines[1].contains("monday.h5") && lines[2].contains("tuesday.h5"), "{text}");
     let found: Value =
         serde_json::from_str(&afmid(here, &["compare", "monday.h5", "tuesday.h5", "--json"])).expect("JSON");

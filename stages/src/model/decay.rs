@@ -228,7 +228,8 @@ impl DecayFit {
         }
         if self.modes == Count::Auto && found == self.max_modes {
             cx.warn(format!(
-                "`modes = \"auto\"` fitted {found} exponentials, all that `max_modes` allows: there may be more modes"
+                "`modes = \"auto\"` fitted {found} exponentials, all that `max_modes` allows: there may be more modes, \
+                 which a larger one in the config looks for"
             ));
         }
         let same = |channel: &usize| {

@@ -18,6 +18,9 @@ const LEAST: usize = 2000;
 /// Share of the squared error of the linear model that the curve has to account for on what did not choose it. Why: a
 /// chain follows some part of any nonlinearity; what it names has to be nearly all of it.
 const SHARE: f64 = 0.9;
+/// Error of a curve at either end over that of one between two linear parts, on what did not choose them, up to which it
+/// stands at that end. Why: the searches end at different places of like errors, a third apart where they were looked at.
+const SIMPLER: f64 = 2.0;
 /// Standard errors of a gain or of a bend that counts.
 const SIGNIFICANT: f64 = 3.0;
 /// Blocks that the gain on what was held out is tested on.
@@ -37,8 +40,9 @@ pub(super) struct Chain {
 /// names nothing; none where no chain accounts for the data.
 ///
 /// # Method
-/// [`fit_block_oriented`] with every structure; the one that is chosen has to be one that may be named. It is judged on the first part, or on the last quarter
-/// of the stretch, which then takes no share in the fit. There its error is below that of the linear model by [`SHARE`] and
+/// [`fit_block_oriented`] with the curve at either end and between two parts; the simplest that does has to be one that may
+/// be named. It is judged on the first part, or on the last quarter of the stretch, which then takes no share in the fit.
+/// There its error is below that of the linear model by [`SHARE`] and
 /// below that of the extended model: where causes describe the data as well, no curve is named beside them.
 ///
 /// `simulated`: by the linear and by the extended model, of the stretch, in the output's unit.
@@ -69,11 +73,20 @@ pub(super) fn chain(
     }
     // nothing is known of what was put in before: the start is simulated and not scored
     let transient = (u.len() / 20).min(1000);
-    // all structures: one that may not be named is no reason for the name of a more general one
-    let wanted = BlockOptions { structures: Structure::ALL.to_vec(), transient, ..BlockOptions::default() };
-    let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
     let end = options.parts.iter().map(|part| part.stretch.end).fold(judged.end.max(stretch.end), usize::max);
-    let simulated = fit.model.simulate(record.input.get(..end)?);
+    let until_end = record.input.get(..end)?;
+    let fitted = |structures: &[Structure]| {
+        let wanted = BlockOptions { structures: structures.to_vec(), transient, ..BlockOptions::default() };
+        let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
+        let simulated = fit.model.simulate(until_end);
+        let after = rms(output, &simulated, 0, &judged)?;
+        Some((fit, simulated, after))
+    };
+    // all structures: one that may not be named is no reason for the name of a more general one
+    let simple = fitted(&[Structure::Wiener, Structure::Hammerstein]);
+    let general = fitted(&[Structure::WienerHammerstein]);
+    let is_worse = simple.as_ref().zip(general.as_ref()).is_some_and(|(one, two)| one.2 > SIMPLER * two.2);
+    let (fit, simulated, after) = if is_worse { general } else { simple.or(general) }?;
     // the other models' errors there: of their simulation where it was learnt from, their rms elsewhere
     let (before, causes) = match held_out {
         Some(part) => {
@@ -85,7 +98,6 @@ pub(super) fn chain(
     };
     // the best linear model's error, wherever it was met: a baseline that causes extend may be far from it
     let before = before.min(fit.linear_rms);
-    let after = rms(output, &simulated, 0, &judged)?;
     let bend = fit.curve_strength();
     let sure = bend.relative > SIGNIFICANT * bend.std && significant(output, &simulated, before, &judged);
     let accounts = after * after < (1.0 - SHARE) * before * before;

@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::verdict::Diagnosis;
+use super::verdict::{Diagnosis, Verdict};
 use super::{DiagnosisOptions, Part, PartStart, Record, Stretch, diagnose};
 
 const RATE_HZ: f64 = 25.0;
@@ -70,10 +70,21 @@ fn motion(modes: &[Mode], u: &[f64]) -> Vec<f64> {
 
 /// A verdict on what a sensor shows of these modes, the last quarter held out.
 fn diagnosed(modes: &[Mode], seed: u64, sensor: impl Fn(usize, f64, f64) -> f64) -> Diagnosis {
+    diagnosed_without(&[], modes, seed, |u| u, sensor)
+}
+
+/// The same of modes that an `actuator` drives, without these causes.
+fn diagnosed_without(
+    without: &[&str],
+    modes: &[Mode],
+    seed: u64,
+    actuator: impl Fn(f64) -> f64,
+    sensor: impl Fn(usize, f64, f64) -> f64,
+) -> Diagnosis {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let highest_hz = modes.iter().map(|mode| mode.frequency_hz).fold(0.0, f64::max);
     let u = input(&mut rng, highest_hz);
-    let x = motion(modes, &u);
+    let x = motion(modes, &u.iter().map(|u| actuator(*u)).collect::<Vec<f64>>());
     let size = (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
     let y: Vec<f64> = x.iter().enumerate().map(|(k, x)| sensor(k, *x, size) + NOISE * size * noise()).collect();
@@ -83,7 +94,8 @@ fn diagnosed(modes: &[Mode], seed: u64, sensor: impl Fn(usize, f64, f64) -> f64)
         start: PartStart::FirstSamples(50),
     };
     let training = vec![Stretch { record: 0, first: 0, end: LEARNT }];
-    let options = DiagnosisOptions { training, parts: vec![part], ..DiagnosisOptions::default() };
+    let mut options = DiagnosisOptions { training, parts: vec![part], ..DiagnosisOptions::default() };
+    options.candidates.retain(|cause| !without.contains(&cause.about().id));
     diagnose(&[Record { input: &u, outputs: vec![&y] }], 1.0 / RATE_HZ, &options).expect("a diagnosis").diagnosis
 }
 
@@ -134,4 +146,14 @@ fn a_step_of_the_gain_beside_two_modes_is_named() {
         let found = diagnosed(&[FIRST, SECOND], seed, |k, x, _| if k > later { 1.15 * x } else { x });
         assert_eq!(names(&found), ["gain-step"], "{seed}: {:?} {:?}", found.verdict, found.evidence);
     }
+}
+
+/// A curve between linear parts is no name for one at the input that is left out: with one part a single gain it is that.
+#[test]
+fn a_curve_at_the_input_that_is_left_out_has_no_more_general_name() {
+    let without = ["input-saturation", "hammerstein-curve", "input-dead-zone"];
+    let found = diagnosed_without(&without, &[FIRST], 1, |u| u.clamp(-0.9, 0.9), |_, x, _| x);
+    assert_eq!((found.verdict, names(&found)), (Verdict::Unexplained, vec![]), "{:?}", found.evidence);
+    let said = found.evidence.iter().any(|line| line.contains("(hammerstein-curve)") && line.contains("is left out"));
+    assert!(said, "{:?}", found.evidence);
 }
