@@ -103,12 +103,12 @@ impl<'a> Bank<'a> {
         };
         let is_peak = |k: usize| gain[k] >= gain[k - 1] && gain[k] >= gain[k + 1] && allowed(k);
         let mut found: Vec<(f64, c64)> = Vec::new();
-        for k in 1..gain.len() - 1 {
+        for (k, own) in gain.iter().enumerate().take(gain.len() - 1).skip(1) {
             // most bins are below what is kept already
-            let is_below = found.len() == most && found.last().is_none_or(|last| gain[k] <= last.0);
+            let is_below = found.len() == most && found.last().is_none_or(|last| *own <= last.0);
             if !is_below && is_peak(k) {
-                let place = found.partition_point(|other| other.0 >= gain[k]);
-                found.insert(place, (gain[k], c64::new(-rate / interval_s, turn * k as f64 / interval_s)));
+                let place = found.partition_point(|other| other.0 >= *own);
+                found.insert(place, (*own, c64::new(-rate / interval_s, turn * k as f64 / interval_s)));
                 found.truncate(most);
             }
         }
