@@ -132,7 +132,7 @@ fn stem(args: &AtOnceArgs) -> String {
 const MOST_BYTES: u64 = 8 << 20;
 
 /// Whether the config is there as it would be written; one that the result beside it was made with, and that nobody has
-/// changed since, is written anew. Errors, usage: another file is there.
+/// changed since, is replaced. Errors, usage: another file is there.
 fn is_the_same(draft: &Draft, files: &Files) -> Result<bool, Failure> {
     let path = &draft.path;
     if path.symlink_metadata().is_err() {

@@ -33,7 +33,7 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
             all.insert("goal".to_owned(), json!(answered.draft.goal));
             all.insert("warnings".to_owned(), json!(warnings));
             all.insert("doubtful".to_owned(), listed.iter().map(Row::is_doubtful).collect());
-            // a resonance and an oscillation are modes for whoever asks for them
+            // a resonance and an oscillation are modes where modes are asked for
             all.entry("modes").or_insert_with(|| listed.iter().map(Row::as_json).collect());
         }
         return print(&pretty(&all)?);

@@ -22,7 +22,7 @@ const RIVAL_SHARE: f64 = 0.25;
 /// Probability of a rival's score by chance, at most.
 const RIVAL_P_VALUE: f64 = 0.05;
 
-/// Lags of what is left at most, the first being 1: without a delay of one sample cause and effect can't be told apart.
+/// Lags of what is left at most, the first being 1: without a delay of one sample cause and effect cannot be distinguished.
 const LAGS: usize = 20;
 /// Lags at least; shorter records are not tested.
 const LEAST_LAGS: usize = 4;
