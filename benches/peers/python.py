@@ -479,7 +479,7 @@ def many(count):
             took, found = timed(call, y)
             seconds += took
             errors.append(relative_errors(found, np.array([f, damping])))
-            if number == 99:
+            if number == min(99, count - 1):
                 early = resident_mb()
         errors = np.array(errors)
         rms = np.sqrt(np.nanmean(errors**2, axis=(0, 2)))
@@ -533,7 +533,8 @@ def main():
         loads.append(os.getloadavg()[0])
         parts[name]()
     packages = ("numpy", "scipy", "sippy_unipi", "nfoursid", "sdypy-EMA")
-    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
+    there = {package.metadata["Name"].replace("-", "_"): package.version for package in importlib.metadata.distributions()}
+    versions = ", ".join(f"{name} {there.get(name.replace('-', '_'), '(not installed)')}" for name in packages)
     print(f"\nPython {platform.python_version()}, {versions}; afmid {importlib.metadata.version('afmid')}.")
     print(f"Load over a minute at the start of each part: {min(loads):.1f} to {max(loads):.1f}, {os.cpu_count()} cores.")
 
