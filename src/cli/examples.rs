@@ -55,8 +55,9 @@ faults, submit again: what is finished is not run again.",
             "afmid modes plate.uff --goal frf",
         ],
         further: "\
-Looked at are free decays, snap-offs of a lever, a measured input and output, a hammer's hits, frequency responses, thermal noise and a steady oscillation. Written is the
-config of `afmid new pipeline RECORDINGS`; change it and `afmid run` it for more. In the table `?` marks what the data do not bear out. Exit codes are those of `run`.",
+Looked at are free decays, snap-offs of a lever, a measured input and output, a hammer's hits, frequency responses,
+thermal noise and a steady oscillation. Written is the config of `afmid new pipeline RECORDINGS`; change it and
+`afmid run` it for more. In the table `?` marks what the data do not bear out. Exit codes are those of `run`.",
     },
     help(&["compare"], &["afmid compare monday.h5 tuesday.h5", "afmid compare years/2004.h5 years/2005.h5 years/2006.h5 --json"]),
     Help {

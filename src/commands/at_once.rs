@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::files::read_regular;
-use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{Artifact, Registry, RunResult, StageRecord};
 use serde_json::{Map, Value, json};
 
@@ -30,7 +29,7 @@ pub struct Answered {
 pub fn answered(args: &AtOnceArgs, goal: Option<Goal>, kind: &str, registry: &Registry) -> Result<Answered, Failure> {
     let files = Files::of(args, kind)?;
     let draft = Draft::new(&args.recordings, goal, |_| Ok(files.config.clone()), registry)?;
-    let is_there = is_the_same(&draft, &files)?;
+    let is_there = is_the_same(&draft)?;
     let read = inputs(&draft.plan, &files.config);
     prepare(&files.result, Target::Result, &read)?;
     prepare(&files.page, Target::Page, &read)?;
@@ -131,24 +130,15 @@ fn stem(args: &AtOnceArgs) -> String {
 /// Largest config that is compared.
 const MOST_BYTES: u64 = 8 << 20;
 
-/// Whether the config is there as it would be written; one that the result beside it was made with, and that nobody has
-/// changed since, is replaced. Errors, usage: another file is there.
-fn is_the_same(draft: &Draft, files: &Files) -> Result<bool, Failure> {
+/// Whether the config is there as it would be written. Errors, usage: another file is: one that a result was made with, too,
+/// may be somebody's work.
+fn is_the_same(draft: &Draft) -> Result<bool, Failure> {
     let path = &draft.path;
     if path.symlink_metadata().is_err() {
         return Ok(false);
     }
-    let bytes = read_regular(path, MOST_BYTES);
-    if bytes.as_ref().is_ok_and(|bytes| bytes == draft.text.as_bytes()) {
+    if read_regular(path, MOST_BYTES).is_ok_and(|bytes| bytes == draft.text.as_bytes()) {
         return Ok(true);
-    }
-    let results = [files.result.clone(), files.result.with_extension("failed.h5")];
-    let made_with = |result: &PathBuf| {
-        let config = ResultFile::open(result).ok().map(|file| file.run().config.clone());
-        bytes.as_ref().is_ok_and(|bytes| config.is_some_and(|config| config.as_bytes() == &bytes[..]))
-    };
-    if results.iter().any(made_with) {
-        return Ok(false);
     }
     let problem = format!("{} is there already, and is not what would be written", path.display());
     let help = format!("choose another name with -o, or remove it; `afmid run {}` runs it as it is", quoted(path));

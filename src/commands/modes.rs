@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use afmid_pipeline::Registry;
+use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use super::at_once::answered;
 use crate::batch::shell::quoted;
-use crate::cli::{Goal, ModesArgs, RecordingsArgs, RecordsAre};
+use crate::cli::{Goal, ModesArgs, RecordingsArgs};
 use crate::failure::Failure;
 use crate::output::print;
 use crate::show::{Row, mode_lines, moves, pretty, rows};
@@ -62,12 +63,8 @@ fn words(args: &RecordingsArgs) -> String {
     args.channel.iter().for_each(|name| add("--channel", name));
     args.input.iter().for_each(|name| add("--input", name));
     args.reference.iter().for_each(|name| add("--reference", name));
-    let records_are = args.records_are.map(|what| match what {
-        RecordsAre::Hits => "hits",
-        RecordsAre::Sensors => "sensors",
-        RecordsAre::Points => "points",
-    });
-    records_are.iter().for_each(|what| add("--as", what));
+    let records_are = args.records_are.and_then(|what| what.to_possible_value());
+    records_are.iter().for_each(|what| add("--as", what.get_name()));
     args.rate.iter().for_each(|rate| add("--rate", &rate.to_string()));
     args.unit.iter().for_each(|unit| add("--unit", unit));
     all.extend(args.resample.then(|| "--resample".to_owned()));

@@ -60,6 +60,13 @@ fn frequency_of(results: &[&Compared], line: &Line) -> Option<f64> {
     result.modes[mode].numbers[0][0]
 }
 
+impl Row {
+    /// Whether a difference of the two says anything: what is not borne out has none.
+    fn is_comparable(&self, other: &Self) -> bool {
+        !self.is_doubtful() && !other.is_doubtful()
+    }
+}
+
 /// Difference of two numbers over its standard error, both errors independent; none where one is not known.
 fn in_errors([from, from_std]: [Option<f64>; 2], [to, to_std]: [Option<f64>; 2]) -> Option<f64> {
     let z = (to? - from?) / from_std?.hypot(to_std?);
@@ -82,8 +89,7 @@ pub fn compared_text(results: &[Compared]) -> String {
                 None => row.extend(["", "none", "", "", "", ""].map(str::to_owned)),
                 Some(own) => {
                     let [f, q] = [0, 1].map(|k| cell(NAMES[k], &own.numbers[k]));
-                    // what is not borne out is no change
-                    let from = first.filter(|first| !first.is_doubtful() && !own.is_doubtful());
+                    let from = first.filter(|first| first.is_comparable(own));
                     let errors = |k: usize| {
                         let z = from.and_then(|from| in_errors(from.numbers[k], own.numbers[k]));
                         z.map_or_else(String::new, |z| format!("{z:+.1}"))
@@ -137,7 +143,8 @@ pub fn compared_json(results: &[Compared]) -> Value {
         let first = results.iter().zip(line).find_map(|(result, mode)| mode.map(|mode| &result.modes[mode]));
         let one = |(result, mode): (&Compared, &Option<usize>)| {
             let Some(own) = mode.map(|mode| &result.modes[mode]) else { return Value::Null };
-            let z = |k: usize| first.and_then(|first| in_errors(first.numbers[k], own.numbers[k]));
+            let from = first.filter(|first| first.is_comparable(own));
+            let z = |k: usize| from.and_then(|from| in_errors(from.numbers[k], own.numbers[k]));
             json!({
                 "frequency_hz": own.numbers[0][0],
                 "frequency_std_hz": own.numbers[0][1],

@@ -95,11 +95,14 @@ fn a_mode_that_moves_leads_on_to_the_diagnosis() {
     let [stdout, _] = said(here, &["modes", "moving.csv", "-o", "m.h5", "--cache", "cache"]);
     assert!(stdout.contains("\na mode that moves is not linear; what by: afmid diagnose moving.csv\n"), "{stdout}");
     assert!(stdout.ends_with("m.toml\nm.h5\nm.html\n"), "{stdout}");
-    // what was said of the recording is said again; a config that the result was made with is no hindrance
-    let [stdout, _] = said(here, &["modes", "moving.csv", "--unit", "rad", "-o", "m.h5", "--cache", "cache"]);
-    assert!(stdout.contains("what by: afmid diagnose moving.csv --unit rad\n"), "{stdout}");
+    // what was said of the recording is said again
+    let given = ["--unit", "rad", "--as", "hits"];
+    let [stdout, _] = said(here, &[&["modes", "moving.csv"], &given[..], &["-o", "n.h5", "--cache", "cache"]].concat());
+    assert!(stdout.contains("what by: afmid diagnose moving.csv --as hits --unit rad\n"), "{stdout}");
+    // a config that another run was made with stays
     let changed = std::fs::read_to_string(here.join("m.toml")).expect("a config") + "# mine\n";
     std::fs::write(here.join("m.toml"), &changed).expect("a config");
+    afmid(here, &["run", "m.toml", "-o", "m.h5", "--cache", "cache"]);
     let output = common::command(here, &["modes", "moving.csv", "-o", "m.h5", "--cache", "cache"]).output();
     assert_eq!(output.expect("afmid starts").status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(here.join("m.toml")).expect("a config"), changed);
