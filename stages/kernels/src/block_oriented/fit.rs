@@ -1,12 +1,13 @@
 //! From data to a model.
 
 use super::conclusion::{concluded, described};
+use super::model::BlockModel;
 use super::options::{BlockError, BlockOptions, checked};
 use super::refine::refined;
 use super::result::{BlockFit, Tried};
 use super::screening::{Candidate, Stretch};
 use super::search::{divided, searched};
-use super::start::{linear, without_weakest};
+use super::start::{Linear, linear, linear_of, without_weakest};
 use crate::monitor::Monitor;
 
 /// Steps on all of the record before the best candidate of each structure goes on alone.
@@ -38,9 +39,33 @@ pub fn fit_block_oriented(
     monitor: &dyn Monitor,
 ) -> Result<BlockFit, BlockError> {
     checked(u, y, options)?;
-    let whole = Stretch { u, y, skipped: options.transient };
     let linear = linear(u, y, options)?;
-    let (kept, given_up) = searched(whole, &linear, options, monitor)?;
+    fitted(Stretch { u, y, skipped: options.transient }, [&linear, &linear], options, monitor)
+}
+
+/// The same from the poles and zeros of a model at hand: a chain shows those of the system where the distortion hides them
+/// from the best linear approximation, and a curve at one end may then do as well. Errors: as [`fit_block_oriented`].
+pub fn fit_from_chain(
+    chain: &BlockModel,
+    u: &[f64],
+    y: &[f64],
+    options: &BlockOptions,
+    monitor: &dyn Monitor,
+) -> Result<BlockFit, BlockError> {
+    checked(u, y, options)?;
+    let linear = linear(u, y, options)?;
+    let own = linear_of(chain, u, &linear);
+    fitted(Stretch { u, y, skipped: options.transient }, [&linear, &own], options, monitor)
+}
+
+/// The search from the poles and zeros of the second, beside the best linear approximation.
+fn fitted(
+    whole: Stretch<'_>,
+    [linear, start]: [&Linear; 2],
+    options: &BlockOptions,
+    monitor: &dyn Monitor,
+) -> Result<BlockFit, BlockError> {
+    let (kept, given_up) = searched(whole, start, options, monitor)?;
     let mut all = Vec::new();
     for own in &kept {
         if let Some(start) = own.with_knots(own.model.curve.values().len(), whole) {
@@ -57,7 +82,7 @@ pub fn fit_block_oriented(
     let mut tried: Vec<Tried> = last.iter().chain(&left).map(|candidate| described(candidate, true)).collect();
     tried.extend(given_up.iter().map(|candidate| described(candidate, false)));
     let best = last.into_iter().next().ok_or(BlockError::NoModel)?;
-    concluded(simplified_or_grown(best, whole, options, monitor)?, whole, &linear, tried)
+    concluded(simplified_or_grown(best, whole, options, monitor)?, whole, linear, tried)
 }
 
 /// The candidate with the poles and knots that Schwarz's criterion favours, at its minimum.

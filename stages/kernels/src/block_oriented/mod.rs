@@ -80,7 +80,7 @@ mod tests;
 mod unit_tests;
 
 pub use curve::Curve;
-pub use fit::fit_block_oriented;
+pub use fit::{fit_block_oriented, fit_from_chain};
 pub use model::{BlockModel, Structure};
 pub use options::{BlockError, BlockOptions};
 pub use rational::Rational;

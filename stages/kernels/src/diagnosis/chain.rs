@@ -10,7 +10,7 @@ use super::options::DiagnosisOptions;
 use super::ruling::{FOLLOWS, follows_output};
 use super::verdict::{Diagnosis, Gain, NamedCause, Rung, Validation, Value, Verdict};
 use crate::Unwatched;
-use crate::block_oriented::{BlockFit, BlockModel, BlockOptions, Structure, fit_block_oriented};
+use crate::block_oriented::{BlockFit, BlockModel, BlockOptions, Structure, fit_block_oriented, fit_from_chain};
 use crate::validation::{Driven, feedback};
 
 /// Fewest samples: some twenty parameters, each with a hundred.
@@ -40,8 +40,8 @@ pub(super) struct Chain {
 /// names nothing; none where no chain accounts for the data.
 ///
 /// # Method
-/// [`fit_block_oriented`] with the curve at either end and between two parts; the simplest that does has to be one that may
-/// be named. It is judged on the first part, or on the last quarter of the stretch, which then takes no share in the fit.
+/// [`fit_block_oriented`] with the curve at either end and between two parts, at the ends from the poles and zeros of the
+/// latter, too; the simplest that does has to be one that may be named. It is judged on the first part, or on the last quarter of the stretch, which then takes no share in the fit.
 /// There its error is below that of the linear model by [`SHARE`] and
 /// below that of the extended model: where causes describe the data as well, no curve is named beside them.
 ///
@@ -75,18 +75,33 @@ pub(super) fn chain(
     let transient = (u.len() / 20).min(1000);
     let end = options.parts.iter().map(|part| part.stretch.end).fold(judged.end.max(stretch.end), usize::max);
     let until_end = record.input.get(..end)?;
-    let fitted = |structures: &[Structure]| {
+    let fitted = |structures: &[Structure], chain: Option<&BlockModel>| {
         let wanted = BlockOptions { structures: structures.to_vec(), transient, ..BlockOptions::default() };
-        let fit = fit_block_oriented(u, y, &wanted, &Unwatched).ok()?;
+        let fit = match chain {
+            None => fit_block_oriented(u, y, &wanted, &Unwatched),
+            Some(chain) => fit_from_chain(chain, u, y, &wanted, &Unwatched),
+        };
+        let fit = fit.ok()?;
         let simulated = fit.model.simulate(until_end);
         let after = rms(output, &simulated, 0, &judged)?;
         Some((fit, simulated, after))
     };
     // all structures: one that may not be named is no reason for the name of a more general one
-    let simple = fitted(&[Structure::Wiener, Structure::Hammerstein]);
-    let general = fitted(&[Structure::WienerHammerstein]);
-    let is_worse = simple.as_ref().zip(general.as_ref()).is_some_and(|(one, two)| one.2 > SIMPLER * two.2);
-    let (fit, simulated, after) = if is_worse { general } else { simple.or(general) }?;
+    let ends = [Structure::Wiener, Structure::Hammerstein];
+    let mut simple = fitted(&ends, None);
+    let general = fitted(&[Structure::WienerHammerstein], None);
+    let is_worse = |simple: &Option<(BlockFit, Vec<f64>, f64)>| {
+        simple.as_ref().zip(general.as_ref()).is_some_and(|(one, two)| one.2 > SIMPLER * two.2)
+    };
+    let hopeless =
+        general.as_ref().is_none_or(|(fit, _, after)| after * after > (1.0 - SHARE) * fit.linear_rms.powi(2));
+    if is_worse(&simple)
+        && !hopeless
+        && let Some(again) = general.as_ref().and_then(|(fit, ..)| fitted(&ends, Some(&fit.model)))
+    {
+        simple = simple.into_iter().chain([again]).min_by(|a, b| a.2.total_cmp(&b.2));
+    }
+    let (fit, simulated, after) = if is_worse(&simple) { general } else { simple.or(general) }?;
     // the other models' errors there: of their simulation where it was learnt from, their rms elsewhere
     let (before, causes) = match held_out {
         Some(part) => {
