@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{About, Cause, Identifiable, Need, Part};
+use super::{About, Cause, Identifiable, Need, Part, runs_have};
 
 /// The page of a cause, in Markdown.
 pub fn page(cause: &dyn Cause) -> String {
@@ -102,6 +102,9 @@ fn naming(about: &About) -> String {
     match about.identifiable {
         Identifiable::Shape => "Named by the shape of the events, in a joint fit.".to_owned(),
         Identifiable::Record => "Named by a channel of its own over whole records.".to_owned(),
+        Identifiable::No(reason) if about.is_met(runs_have) => {
+            format!("Named in runs of a system, not in releases: {reason}.")
+        }
         Identifiable::No(reason) => format!("Cannot be named from the data at hand: {reason}."),
     }
 }

@@ -360,7 +360,7 @@ fn records_carry_drift_of_the_modes_added_volts_and_limits() {
     let delayed = record(&microscope(1.0), &Effects { delay_s: 2.0 / RATE_HZ, ..Effects::default() });
     // both grids meet the same instants to rounding; a code may flip at its edge
     assert!((100..50_000).filter(|&k| delayed[k + 2] != plain[k]).count() < 20);
-    let lost = record(&microscope(1.0), &Effects { lost: vec![(4e-3, 7)], ..Effects::default() });
+    let lost = record(&microscope(1.0), &Effects { lost: vec![(4e-3, 7.0)], ..Effects::default() });
     assert_eq!(lost.len(), plain.len());
     assert_eq!(lost[..20_000], plain[..20_000]);
     assert_eq!(lost[20_000..50_000], plain[20_007..50_007]);

@@ -15,8 +15,9 @@ use super::ruling::{ALARMS_OF_LAW, FOLLOWS};
 use super::score_test::{Candidate, trials};
 use super::selection::{Choice, Search};
 use super::simulation::{ModalSimulation, Simulation};
+use super::steady_lines::SteadyLines;
 use super::story::{Story, story};
-use super::unnamed_law::unnamed_law;
+use super::unnamed_law::{UnnamedLaw, simpler_law, unnamed_law};
 use super::validation::check_part;
 use super::verdict::{Diagnosis, Verdict};
 use crate::Unwatched;
@@ -64,7 +65,8 @@ fn sampled(whole: &Bench, every: usize) -> Bench {
 /// A sum of modes, free masses and real poles under the measured input, if there is one, free-running from a state of
 /// each stretch's own; all else is a cause.
 /// # Method
-/// Least squares of the free-run error on what is learnt from; causes added by score test, joint refits of the best
+/// Lines that go on through free decays are taken out first, each hit's with a phase of its own. Least squares of the
+/// free-run error on what is learnt from; causes added by score test, joint refits of the best
 /// five, and likelihood less the Bayesian penalty; dropped or exchanged where later ones do better; each tested by
 /// blocks against its best rival. What a library of general terms still predicts of the residual decides whether the
 /// causes are the whole story.
@@ -84,6 +86,26 @@ pub fn diagnose(
     interval_s: f64,
     options: &DiagnosisOptions,
 ) -> Result<Diagnosed, DiagnosisError> {
+    let mut seen = SteadyLines::find(records, interval_s, options);
+    while let Some(lines) = seen {
+        let mut found = modelled(&lines.rest(), interval_s, options)?;
+        let left: Vec<f64> = found.output.iter().zip(&found.after).map(|(y, made)| y - made).collect();
+        match lines.confirmed(&left, options, &mut found.diagnosis) {
+            Ok(lines) => {
+                for (k, line) in lines.simulated(&options.training).into_iter().enumerate() {
+                    found.output[k] += line;
+                    found.after[k] += line;
+                }
+                return Ok(found);
+            }
+            Err(fewer) => seen = fewer,
+        }
+    }
+    modelled(records, interval_s, options)
+}
+
+/// The same of records without steady lines.
+fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions) -> Result<Diagnosed, DiagnosisError> {
     let whole = Bench::new(records, &options.training, interval_s, 0.0, options.one_unit)?;
     options.parts.iter().try_for_each(|part| check_part(part, &whole, records))?;
     let sample = sampled(&whole, 1);
@@ -111,7 +133,9 @@ pub fn diagnose(
             break;
         }
     }
-    let Some(last) = best_of(extended) else { return Err(DiagnosisError::NoBaseline) };
+    let Some((last, simpler)) = best_of(extended) else { return Err(DiagnosisError::NoBaseline) };
+    let law_of_simpler = simpler.iter().find_map(|simpler| last.beaten_by_a_law_of(simpler, options));
+    let on_sample = last.choice.ladder.last().map_or(f64::NAN, |last| last.fit.loss);
     let Extended { bench, blocks, choice, adequate, .. } = last
         .on_all(records, interval_s, options)
         .or_else(|| last.linear_on_all(records, interval_s, options))
@@ -125,6 +149,7 @@ pub fn diagnose(
         &candidates(options, &bench, &last.fit.model),
         ALARMS_OF_LAW * options.false_alarm_rate,
     );
+    let unnamed = law_of_simpler.map(|law| law.scaled(last.fit.loss / on_sample)).or(unnamed);
     let first = &choice.ladder[0].fit;
     let linear = first.model.clone();
     let simulated = [&first.simulated[..], &last.fit.simulated];
@@ -210,6 +235,19 @@ impl Extended {
             || self.choice.lacks(&misfit(&self.bench, &last.fit, &self.blocks), options.tolerated_misfit)
     }
 
+    /// A law without a name that extends a simpler linear model to leave less than all causes of this one; none where this
+    /// one has fewer than two.
+    fn beaten_by_a_law_of(&self, simpler: &Self, options: &DiagnosisOptions) -> Option<UnnamedLaw> {
+        let (first, last) = (&simpler.choice.ladder.first()?.fit, &self.choice.ladder.last()?.fit);
+        let same = self.bench.stretches == simpler.bench.stretches && self.bench.interval_s == simpler.bench.interval_s;
+        if last.model.causes.len() < 2 || !same {
+            return None;
+        }
+        let candidates = candidates(options, &simpler.bench, &first.model);
+        let level = ALARMS_OF_LAW * options.false_alarm_rate;
+        simpler_law(&simpler.bench, first, last, &simpler.blocks, &candidates, level)
+    }
+
     fn criterion(&self) -> f64 {
         self.choice.ladder.last().map_or(f64::INFINITY, |last| criterion(&self.bench, &last.fit))
     }
@@ -228,8 +266,8 @@ const FAR_BETTER: f64 = 100.0;
 const BETTER: f64 = 2.0;
 
 /// The first that is as good as any linear model and not far worse than those that come behind it; the last, which a linear
-/// model alone is, where none is.
-fn best_of(extended: Vec<Extended>) -> Option<Extended> {
+/// model alone is, where none is. Those before it, which are simpler, come with it.
+fn best_of(mut extended: Vec<Extended>) -> Option<(Extended, Vec<Extended>)> {
     let last = extended.len().checked_sub(1)?;
     let adequate = |of: &Extended| of.adequate;
     let far = |of: &Extended| of.blocks.count() as f64 * BETTER.ln();
@@ -238,7 +276,8 @@ fn best_of(extended: Vec<Extended>) -> Option<Extended> {
         extended[place + 1..].iter().any(|of| of.criterion() + far(of) < own)
     };
     let first = (0..last).find(|place| adequate(&extended[*place]) && !is_beaten(*place)).unwrap_or(last);
-    extended.into_iter().nth(first)
+    extended.truncate(first + 1);
+    extended.pop().map(|chosen| (chosen, extended))
 }
 
 /// Extends a baseline with at most so much work; how much it was.

@@ -5,6 +5,7 @@ use super::data::{Bench, Stretch};
 use super::dynamics::{Kind, Section};
 use super::fit::{Fit, Until};
 use super::ruling::{Claim, Grounds, follows_output, high_band_variance, left_beyond_noise, left_repeating, repeats};
+use super::scatter::{Compared, unlike_noise};
 use super::selection::Judged;
 use super::validation::{held_out, pooled_rms};
 use super::verdict::NamedCause;
@@ -13,6 +14,9 @@ use crate::validation::{Driven, Feedback, feedback};
 
 /// Nepers over the longest stretch below which nothing is known of a damping: of an error of a thousandth a share.
 const ENDLESS: f64 = 1e-3;
+/// Loss of an exponential over that of another within one another's width, at which it may be what the square of the other's
+/// amplitude makes of its frequency or damping: three times, as far as other terms let it be seen.
+const COMPANION: std::ops::Range<f64> = 2.5..3.5;
 
 impl Findings<'_> {
     /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
@@ -33,7 +37,8 @@ impl Findings<'_> {
             held_out: ends.map(|(before, after)| [before * before, after * after]),
             noise,
             against_clean: self.repeated().into_iter().chain(self.beyond_noise(noise)).collect(),
-            against_all: self.endless().into_iter().chain(self.follows()).collect(),
+            unlike_noise: self.unlike_noise(),
+            against_all: self.endless().into_iter().chain(self.follows()).chain(self.companion()).collect(),
         }
     }
 
@@ -77,6 +82,18 @@ impl Findings<'_> {
         self.bench.driven.then(|| left_beyond_noise(left / self.rms(variance)?.powi(2))).flatten()
     }
 
+    /// What tells that which the last model leaves from noise, in sentences.
+    fn unlike_noise(&self) -> Vec<String> {
+        let (Some(last), layout) = (self.choice.ladder.last(), &self.bench.layout) else { return Vec::new() };
+        let compared = |part: std::ops::Range<usize>| Compared {
+            measured: &self.bench.output[part.clone()],
+            simulated: &last.fit.simulated[part],
+        };
+        let parts = (0..layout.stretches())
+            .flat_map(|e| (0..layout.channels).map(move |channel| layout.part(e, channel, 0, layout.samples(e))));
+        unlike_noise(&parts.map(compared).collect::<Vec<_>>(), self.bench.interval_s)
+    }
+
     /// What says that a measured input follows the output, in a sentence; none where nothing does, and where what is left is
     /// not what any linear model leaves.
     fn follows(&self) -> Option<String> {
@@ -102,6 +119,27 @@ impl Findings<'_> {
         };
         let stretches: Option<Vec<Driven<'_>>> = self.bench.stretches.iter().enumerate().map(one).collect();
         feedback(&stretches?)
+    }
+
+    /// Two modes of free decays with causes that one mode makes which moves with its amplitude, in a sentence; none where there
+    /// are none.
+    fn companion(&self) -> Option<String> {
+        let last = &self.choice.ladder.last()?.fit.model;
+        if self.bench.driven || last.causes.is_empty() {
+            return None;
+        }
+        let modes = || last.dynamics.sections.iter().filter(|section| section.kind == Kind::Oscillator);
+        let beside = |a: &Section, b: &Section| {
+            (a.frequency_hz - b.frequency_hz).abs() < 0.5 * (a.loss * a.frequency_hz + b.loss * b.frequency_hz)
+        };
+        let (slow, fast) = modes()
+            .flat_map(|a| modes().map(move |b| (a, b)))
+            .find(|(a, b)| COMPANION.contains(&(b.loss / a.loss)) && beside(a, b))?;
+        Some(format!(
+            "of two modes at {:.4} and {:.4} Hz one dies away three times as fast: one mode that moves with the square of its \
+             amplitude makes both, and causes beside them stand for its law",
+            slow.frequency_hz, fast.frequency_hz
+        ))
     }
 
     /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.

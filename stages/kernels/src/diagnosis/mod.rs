@@ -37,14 +37,18 @@ mod library;
 mod limited_rates;
 mod linear_only;
 mod options;
+#[cfg(test)]
+mod record_tests;
 pub mod records;
 pub mod release;
 mod ruling;
+mod scatter;
 mod score_test;
 mod selection;
 mod settled;
 mod simulation;
 pub mod steady;
+mod steady_lines;
 mod story;
 #[cfg(test)]
 mod structure_tests;

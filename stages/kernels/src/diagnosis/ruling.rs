@@ -10,6 +10,9 @@ const OF_EXCESS: f64 = 0.5;
 /// Share of what all causes take together, of the squared error of what was held out, that names alone may miss. Why: names
 /// beside as much else may stand for what that is part of.
 const BESIDE: f64 = 0.05;
+/// Share of the squared error that a linear model leaves beyond noise which names together have to account for. Why: less
+/// is a part of something else.
+const ACCOUNTED: f64 = 0.5;
 /// Mean square on held-out data over that of training from which on they do not agree: an error twice as large. Why not
 /// less: a part to judge on begins in a state that few samples tell.
 const AGREES: f64 = 4.0;
@@ -89,6 +92,8 @@ pub struct Grounds {
     pub noise: Option<f64>,
     /// What tests say against a linear model as the whole story, in sentences.
     pub against_clean: Vec<String>,
+    /// What tells that which the answer's model leaves from noise, in sentences.
+    pub unlike_noise: Vec<String>,
     /// What speaks against any answer, in sentences.
     pub against_all: Vec<String>,
 }
@@ -108,9 +113,9 @@ impl Grounds {
     /// # Method
     /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves
     /// beyond noise, where it was fitted or held out, whichever is less. `named` if a name stands, the names alone miss at
-    /// most a twentieth of what all causes take, the model is adequate, nothing systematic is left, and the answer's error
+    /// most a twentieth of what all causes take and account for half of what is left beyond noise, the model is adequate, nothing systematic is left, and the answer's error
     /// on what was held out is below the linear model's. `clean` if there is no cause, and neither a test nor the held-out
-    /// error contradicts. Else `unexplained`.
+    /// error contradicts, and what is left scatters as noise does. Else `unexplained`.
     ///
     /// `alone`: mean square on what was held out of a model with these claims alone, refitted; none where it is not known.
     pub fn ruling(&self, alone: &dyn Fn(&[usize]) -> Option<f64>) -> Ruling {
@@ -129,10 +134,11 @@ impl Grounds {
             return verdict(Verdict::Unexplained, Vec::new(), vec![said]);
         }
         if !self.adequate || self.systematic || !self.against_all.is_empty() {
-            return verdict(Verdict::Unexplained, Vec::new(), Vec::new());
+            return verdict(Verdict::Unexplained, Vec::new(), self.unlike_noise.clone());
         }
         if !any {
-            let against: Vec<String> = self.against_clean.iter().cloned().chain(self.disagreement()).collect();
+            let tests = self.against_clean.iter().chain(&self.unlike_noise).cloned();
+            let against: Vec<String> = tests.chain(self.disagreement()).collect();
             let found = if against.is_empty() { Verdict::Clean } else { Verdict::Unexplained };
             return verdict(found, Vec::new(), against);
         }
@@ -158,7 +164,19 @@ impl Grounds {
             ));
             stand.clear();
         }
+        if let Some(share) = self.accounted(|| if fallen.is_empty() { None } else { alone(&stand) })
+            && !stand.is_empty()
+            && share < ACCOUNTED
+        {
+            fallen.push(format!(
+                "the names account for {:.1} % of the squared error that the linear model leaves beyond noise: less than half",
+                100.0 * share
+            ));
+            stand.clear();
+        }
         let found = if stand.is_empty() { Verdict::Unexplained } else { Verdict::Named };
+        // beside names it is said
+        fallen.extend(self.unlike_noise.iter().cloned());
         verdict(found, stand, fallen)
     }
 
@@ -179,6 +197,12 @@ impl Grounds {
                 100.0 * gain / excess
             )
         })
+    }
+
+    /// Share of the linear model's squared error beyond noise that the answer's model takes, or the names that stand alone.
+    fn accounted(&self, alone: impl Fn() -> Option<f64>) -> Option<f64> {
+        let ([before, after], noise) = (self.held_out?, self.noise?);
+        (before > noise).then(|| (before - alone().unwrap_or(after)) / (before - noise))
     }
 
     fn disagreement(&self) -> Option<String> {
@@ -269,6 +293,7 @@ mod tests {
             Grounds { held_out: Some([4.1, 4.1]), ..fine() },
             Grounds { held_out: Some([f64::NAN, f64::NAN]), ..fine() },
             Grounds { against_clean: vec!["it repeats".to_owned()], ..fine() },
+            Grounds { unlike_noise: vec!["it has spikes".to_owned()], ..fine() },
             Grounds { against_all: vec!["the input follows the output".to_owned()], ..fine() },
             Grounds { unnamed: true, ..fine() },
         ];
@@ -307,6 +332,9 @@ mod tests {
         assert_eq!((found.verdict, found.stand.len(), found.because.len()), (Verdict::Unexplained, 0, 2));
         let found = grounds.ruling(&|_| Some(1.1));
         assert_eq!((found.verdict, found.stand), (Verdict::Named, vec![0]));
+        // nor that takes a third of what the linear model leaves
+        let found = of(vec![claim("a", [1.5, 1.0])], [1.5, 1.0], 0.05);
+        assert!(found.verdict == Verdict::Unexplained && found.because[0].contains("34.5 % of the squared error"));
         let found = of(vec![claim("b", [1.01, 1.0])], [9.0, 1.0], 0.1);
         assert_eq!(found.verdict, Verdict::Unexplained);
         let found = of(vec![claim("c", [0.9, 1.0])], [9.0, 1.0], 1.0);

@@ -239,7 +239,8 @@ impl ModalSimulation {
             dynamics.to_mut().sections.iter_mut().for_each(|section| section.frequency_hz *= factor);
         }
         let (reference_s, steps) = (self.reference_s, self.steps);
-        let span = Span { interval_s, begin_s: 0.0, origin_s: 0.0, reference_s, record: 0, steps, samples };
+        let span =
+            Span { interval_s, begin_s: 0.0, origin_s: 0.0, reference_s, record: 0, steps, samples, stored: samples };
         let run = Run { dynamics, state: &state, nodes: nodes.as_deref(), effects: &effects, span };
         let output = outputs(&[run]).pop().unwrap_or_default();
         let channels = output.chunks_exact(samples).zip(&self.output_scale);

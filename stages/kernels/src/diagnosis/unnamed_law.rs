@@ -8,6 +8,7 @@ use super::lack_of_fit::clean;
 use super::library::{Law, library};
 use super::score_test::{Basis, Candidate, screen};
 use super::selection::TIE;
+use crate::causes::Part;
 use crate::effects::{Effects, ModalForce};
 use crate::statistics::f_tail;
 
@@ -25,7 +26,7 @@ pub(super) struct UnnamedLaw {
 }
 
 /// Laws that are fitted in the place of all causes.
-const FITTED: usize = 2;
+const FITTED: usize = 3;
 
 /// The term of the library that would take most of a fit's residual, of those that are significant; or, where names are
 /// many, one of the largest that alone does better than all of them.
@@ -35,8 +36,9 @@ const FITTED: usize = 2;
 /// the term itself fitted, so that whatever else is left counts as noise; an F ratio of one and one fewer than the
 /// blocks, by Bonferroni for all terms; and it has to gain on folds that did not fit it. Aimed at one term each it sees
 /// what a prediction from all of them drowns in their number. Of the largest that are forces, before any cause came and
-/// after the last, the linear model with that force alone is fitted too: where several causes stand in for a law that no
-/// one has named they come close together, and the law comes closer.
+/// after the last, the linear model with that force alone is fitted too, beside those causes that imitate no law, the
+/// course of the input and what is added to the record: where several causes stand in for a law that no one has named
+/// they come close together, and the law comes closer.
 /// # Source
 /// C. R. Rao, Linear Statistical Inference and Its Applications, 2nd ed., 1973, section 6e.
 pub(super) fn unnamed_law(
@@ -47,20 +49,16 @@ pub(super) fn unnamed_law(
     false_alarm_rate: f64,
 ) -> Option<UnnamedLaw> {
     let mut found = significant(bench, fit, blocks, false_alarm_rate);
-    let unnamed = |force: &Candidate| !candidates.iter().any(|own| same(own, force));
-    let fitted = |found: &mut Vec<(UnnamedLaw, Option<Candidate>)>| {
-        let forces = found.iter_mut().filter_map(|(law, force)| Some((law, force.as_ref()?)));
-        for (law, force) in forces.filter(|(_, force)| unnamed(force)).take(FITTED) {
-            law.alone = alone(bench, baseline, force);
-        }
-    };
-    if !fit.model.causes.is_empty() {
-        fitted(&mut found);
+    let beside = beside_laws(bench, baseline, fit);
+    let laws = fit.model.causes.len() - beside.as_ref().unwrap_or(baseline).model.causes.len();
+    let before = beside.as_ref().unwrap_or(baseline);
+    if laws > 0 {
+        fit_alone(bench, before, &mut found, candidates);
     }
-    if fit.model.causes.len() > 1 {
+    if laws > 1 {
         // what several names share is seen whole before any of them came
-        let mut first = significant(bench, baseline, blocks, false_alarm_rate);
-        fitted(&mut first);
+        let mut first = significant(bench, before, blocks, false_alarm_rate);
+        fit_alone(bench, before, &mut first, candidates);
         first.retain(|(law, _)| law.beats(bench, fit));
         found.extend(first);
     }
@@ -68,7 +66,47 @@ pub(super) fn unnamed_law(
     (place < found.len()).then(|| found.swap_remove(place).0)
 }
 
+/// A law without a name that beside a simpler linear model leaves less than a richer one with all its causes, `fit`; none
+/// where there is none.
+pub(super) fn simpler_law(
+    bench: &Bench,
+    simpler: &Fit,
+    fit: &Fit,
+    blocks: &Blocks,
+    candidates: &[Candidate],
+    false_alarm_rate: f64,
+) -> Option<UnnamedLaw> {
+    let before = beside_laws(bench, simpler, fit);
+    let before = before.as_ref().unwrap_or(simpler);
+    let mut found = significant(bench, before, blocks, false_alarm_rate);
+    fit_alone(bench, before, &mut found, candidates);
+    found.into_iter().map(|(law, _)| law).find(|law| law.beats(bench, fit))
+}
+
+/// Fits the linear model with each of the largest forces that no candidate is.
+fn fit_alone(bench: &Bench, linear: &Fit, found: &mut [(UnnamedLaw, Option<Candidate>)], candidates: &[Candidate]) {
+    let unnamed = |force: &Candidate| !candidates.iter().any(|own| same(own, force));
+    let forces = found.iter_mut().filter_map(|(law, force)| Some((law, force.as_ref()?)));
+    for (law, force) in forces.filter(|(_, force)| unnamed(force)).take(FITTED) {
+        law.alone = alone(bench, linear, force);
+    }
+}
+
+/// The linear model with those causes of a fit that imitate no law: the course of the input between samples and what is added
+/// to the record. None where there are none.
+fn beside_laws(bench: &Bench, linear: &Fit, fit: &Fit) -> Option<Fit> {
+    let kept = fit.model.causes.iter().filter(|added| added.is_choice() || added.cause.about().part == Part::Record);
+    let mut model = linear.model.clone();
+    model.causes.extend(kept.cloned());
+    (model.causes.len() > linear.model.causes.len()).then(|| Fit::new(bench, &model, Until::JUDGED)).flatten()
+}
+
 impl UnnamedLaw {
+    /// The same on more samples, where all losses are larger by a factor.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { gain: self.gain * factor, alone: self.alone.map(|loss| loss * factor), ..self }
+    }
+
     /// Whether it alone describes more than all causes of a fit together.
     pub fn beats(&self, bench: &Bench, fit: &Fit) -> bool {
         let variance = fit.loss / bench.count as f64;
@@ -128,7 +166,7 @@ fn same(own: &Candidate, other: &Candidate) -> bool {
 fn alone(bench: &Bench, baseline: &Fit, force: &Candidate) -> Option<f64> {
     let promise = screen(bench, baseline, std::slice::from_ref(force)).into_iter().next()?;
     let fitted = |values: Vec<f64>| {
-        Fit::new(bench, &baseline.model.with(force.cause, &force.modes, values), Until::MINIMUM).map(|fit| fit.loss)
+        Fit::new(bench, &baseline.model.with(force.cause, &force.modes, values), Until::JUDGED).map(|fit| fit.loss)
     };
     [promise.values, promise.trial].into_iter().filter_map(fitted).min_by(f64::total_cmp)
 }

@@ -267,8 +267,9 @@ pub struct Effects {
     pub delay_s: f64,
     /// Standard deviation of the light's intensity over its mean.
     pub intensity: f64,
-    /// Samples that were never stored: when since the record's start (s), how many.
-    pub lost: Vec<(f64, usize)>,
+    /// Samples that were never stored: when since the record's start (s), how many; a fraction of one is a shift of the
+    /// clock.
+    pub lost: Vec<(f64, f64)>,
     /// What a measured input passes through in order. Paths act on its whole record, between samples too.
     pub input: Vec<Passage>,
     /// How a measured input runs between samples; none: as the baseline has it.
@@ -282,9 +283,15 @@ impl Effects {
     pub fn have_the_input_of(&self, others: &Self) -> bool {
         let same = |(own, other): (&Passage, &Passage)| own.is(other);
         self.intersample == others.intersample
+            && self.lost_samples() == others.lost_samples()
             && self.by_sample == others.by_sample
             && self.input.len() == others.input.len()
             && self.input.iter().zip(&others.input).all(same)
+    }
+
+    /// Samples that were never stored, all together, the last begun counted whole.
+    pub fn lost_samples(&self) -> usize {
+        self.lost.iter().map(|(_, count)| count.max(0.0)).sum::<f64>().ceil() as usize
     }
 
     /// Whether the motion itself is no longer that of a linear lever under the load.

@@ -300,8 +300,11 @@ struct Lost(Vec<(usize, usize)>);
 
 impl Lost {
     fn new(effects: &Effects, sample_rate_hz: f64) -> Self {
-        let mut gaps: Vec<(usize, usize)> =
-            effects.lost.iter().map(|(time_s, count)| ((time_s * sample_rate_hz).max(0.0) as usize, *count)).collect();
+        let mut gaps: Vec<(usize, usize)> = effects
+            .lost
+            .iter()
+            .map(|(time_s, count)| ((time_s * sample_rate_hz).max(0.0) as usize, *count as usize))
+            .collect();
         gaps.sort_unstable();
         Self(gaps)
     }

@@ -276,7 +276,8 @@ impl Bench {
             reference_s: self.reference_s,
             record: stretch.record,
             steps: self.steps,
-            samples: stretch.samples(),
+            samples: stretch.samples() + effects.lost_samples(),
+            stored: stretch.samples(),
         };
         Run { dynamics: self.dynamics(model, stretch, effects), state, nodes, effects, span }
     }
@@ -326,13 +327,14 @@ impl Bench {
             Intersample::Linear => &inputs[1],
             Intersample::BandLimited => &inputs[2],
         };
-        let nodes = input.part(stretch.first, stretch.end);
+        let end = (stretch.end + effects.lost_samples()).min(input.samples());
+        let nodes = input.part(stretch.first, end);
         if effects.input.is_empty() {
             return (!nodes.is_empty()).then_some(Cow::Borrowed(nodes));
         }
         if effects.by_sample || effects.input.iter().any(Passage::is_path) {
             // from the record's beginning, so that all its stretches and parts see the same input
-            let mut whole = input.passed(&effects.input, stretch.end, self.interval_s, effects.by_sample);
+            let mut whole = input.passed(&effects.input, end, self.interval_s, effects.by_sample);
             return Some(Cow::Owned(whole.split_off(whole.len().saturating_sub(nodes.len()))));
         }
         let mut nodes = nodes.to_vec();

@@ -48,6 +48,11 @@ impl FineInput {
         Self { nodes, steps }
     }
 
+    /// Samples of the record.
+    pub fn samples(&self) -> usize {
+        self.nodes.len().div_ceil(2 * self.steps + 1)
+    }
+
     /// Nodes of the intervals that begin at samples `first..end - 1`, and the one at sample `end - 1`.
     pub fn part(&self, first: usize, end: usize) -> &[f64] {
         let width = 2 * self.steps + 1;

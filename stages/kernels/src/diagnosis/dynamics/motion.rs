@@ -26,12 +26,20 @@ pub struct Span {
     pub steps: usize,
     /// Samples.
     pub samples: usize,
+    /// Of these the first are stored; those behind come where others were lost.
+    pub stored: usize,
 }
 
 impl Span {
     /// Time of sample k since the record's first, s.
     pub(super) fn time_s(&self, k: usize) -> f64 {
         self.begin_s + k as f64 * self.interval_s
+    }
+
+    /// Place among the taken samples of stored sample k.
+    pub(super) fn taken(&self, k: usize, effects: &Effects) -> f64 {
+        let before = effects.lost.iter().filter(|(time_s, _)| *time_s <= self.time_s(k));
+        k as f64 + before.map(|(_, count)| count).sum::<f64>()
     }
 
     /// What the instrument adds at sample k.

@@ -85,7 +85,8 @@ impl Seen {
         let Run { dynamics, state, nodes, effects, span } = run;
         let width = 2 * span.steps + 1;
         let mut output = Vec::with_capacity(span.samples * self.sums.len());
-        let plain = dynamics.through.is_none() && effects.optics.is_empty() && effects.added.is_empty();
+        let changed = !(effects.optics.is_empty() && effects.added.is_empty() && effects.lost.is_empty());
+        let plain = dynamics.through.is_none() && !changed;
         for (channel, sums) in self.sums.iter().enumerate() {
             let offset = state.offsets.get(channel).copied().unwrap_or(0.0);
             if plain {
@@ -101,9 +102,30 @@ impl Seen {
             }
             pass(&effects.optics, |k| span.time_s(k), &mut output[begin..]);
             output[begin..].iter_mut().enumerate().for_each(|(k, y)| *y += offset + span.added(k, effects));
+            if !effects.lost.is_empty() {
+                let taken = output.split_off(begin);
+                output.extend((0..span.stored).map(|k| between(&taken, span.taken(k, effects))));
+            }
         }
         output
     }
+}
+
+/// Samples at a place between them: a cubic through the two beside it that has their slopes, linear at the ends.
+fn between(samples: &[f64], place: f64) -> f64 {
+    let last = samples.len().saturating_sub(1);
+    let k = (place.max(0.0) as usize).min(last);
+    let at = |k: usize| samples.get(k.min(last)).copied().unwrap_or(0.0);
+    let (share, a, b) = ((place - k as f64).clamp(0.0, 1.0), at(k), at(k + 1));
+    let (before, behind) =
+        (if k > 0 { at(k - 1) } else { 2.0 * a - b }, if k + 1 < last { at(k + 2) } else { 2.0 * b - a });
+    let (rise, fall) = (0.5 * (b - before), 0.5 * (behind - a));
+    let square = share * share;
+    let cube = square * share;
+    a * (2.0 * cube - 3.0 * square + 1.0)
+        + b * (3.0 * square - 2.0 * cube)
+        + rise * (cube - 2.0 * square + share)
+        + fall * (cube - square)
 }
 
 impl Sink for Seen {

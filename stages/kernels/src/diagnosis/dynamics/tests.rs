@@ -16,7 +16,8 @@ fn state(level: f64) -> State {
 }
 
 fn run<'a>(state: &'a State, effects: &'a Effects, input: Option<&'a [f64]>, samples: usize) -> Run<'a> {
-    let span = Span { interval_s: 1.0, begin_s: 0.0, origin_s: 0.0, reference_s: 1.0, record: 0, steps: 2, samples };
+    let (interval_s, reference_s, stored) = (1.0, 1.0, samples);
+    let span = Span { interval_s, begin_s: 0.0, origin_s: 0.0, reference_s, record: 0, steps: 2, samples, stored };
     Run { dynamics: Cow::Owned(modes()), state, nodes: input, effects, span }
 }
 

@@ -7,7 +7,7 @@ pub(crate) use choice::{Choice, Chosen, Judged};
 use super::data::Bench;
 use super::dynamics::Model;
 use super::fit::{Blocks, Chords, Fit, Until, dot};
-use super::instants::instant;
+use super::instants::{instant, nearest_instant};
 use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, other_choices, screen, significance};
@@ -121,7 +121,7 @@ impl Search<'_> {
                 return nearest;
             }
             match self.best(&current, &promises) {
-                Some(next) => ladder.push(self.best_choice(next)),
+                Some(next) => ladder.push(self.best_instants(self.best_choice(next))),
                 None => return nearest,
             }
         }
@@ -137,6 +137,20 @@ impl Search<'_> {
             if let Some(better) = others.filter(|fit| fit.loss < best.fit.loss).min_by(|a, b| a.loss.total_cmp(&b.loss))
             {
                 best = Judged::new(better, self.bench, &self.blocks);
+            }
+        }
+        best
+    }
+
+    /// The same with each cause that sets in at an instant moved to the best one near by: it was found while other causes were
+    /// missing, and has no slope.
+    fn best_instants(&self, judged: Judged) -> Judged {
+        let mut best = judged;
+        for which in 0..best.fit.model.causes.len() {
+            if let Some(model) = nearest_instant(self.bench, &best.fit, which)
+                && let Some(fit) = Fit::new(self.bench, &model, Until::JUDGED).filter(|fit| fit.loss < best.fit.loss)
+            {
+                best = Judged::new(fit, self.bench, &self.blocks);
             }
         }
         best
