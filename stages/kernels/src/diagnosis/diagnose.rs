@@ -195,6 +195,13 @@ fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions)
             diagnosis = linear.answer(part, &options.output_unit, options.tolerated_misfit, options.false_alarm_rate);
             after.clone_from(&before);
         } else {
+            // a linear model that is the whole story holds in the rest of the record, too
+            let is_linear = !unexplained && diagnosis.causes.iter().all(|cause| cause.id == INTERSAMPLE);
+            if let Some(said) = linear.disagreement().filter(|_| is_linear) {
+                diagnosis.verdict = Verdict::Unexplained;
+                diagnosis.causes.clear();
+                diagnosis.evidence.push(said);
+            }
             diagnosis.evidence.extend(linear.sentences(options.tolerated_misfit));
             let is_said = diagnosis.evidence.iter().any(|line| line.starts_with(FOLLOWS));
             let follows = linear.follows_output(options.false_alarm_rate);
@@ -203,6 +210,9 @@ fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions)
     }
     Ok(Diagnosed { diagnosis, output, before, after, story, simulation })
 }
+
+/// A choice that a linear model has as well.
+const INTERSAMPLE: &str = "intersample";
 
 /// How far a linear model of one input goes, where no model accounts for the data.
 fn alone(bench: &Bench, records: &[Record<'_>], options: &DiagnosisOptions) -> Option<LinearOnly> {

@@ -60,6 +60,12 @@ impl LinearOnly {
         follows_output(&self.feedback, false_alarm_rate)
     }
 
+    /// What says that it does not hold where it was not fitted, in a sentence; none where it does.
+    pub(super) fn disagreement(&self) -> Option<String> {
+        let (training, held_out) = (Some(self.training_rms.powi(2)), Some([self.rms.powi(2); 2]));
+        Grounds { training, held_out, ..Grounds::default() }.disagreement()
+    }
+
     fn ruling(&self, tolerated: f64, false_alarm_rate: f64) -> Ruling {
         let beyond = self.beyond_noise.and_then(left_beyond_noise);
         let against = beyond.into_iter().chain(self.repeats.and_then(left_repeating)).collect();

@@ -162,3 +162,24 @@ fn rows_that_are_lost_a_shock_and_spikes_are_said() {
         assert!(found.verdict != Verdict::Clean && is_said && !other, "{what}: {found:?}");
     }
 }
+
+/// Nothing of the second half is learnt from; a linear model has to hold there as well.
+#[test]
+fn what_happens_behind_what_was_learnt_from_is_not_clean() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let u = input(&mut rng, FIRST.frequency_hz);
+    let y = motion(&[FIRST], &u);
+    let mut less = y.clone();
+    less.drain(6000..6003);
+    let mut spiky = y.clone();
+    spiky.iter_mut().skip(5001).step_by(701).for_each(|y| *y += 0.5);
+    for (y, is_linear) in [(&y, true), (&less, false), (&spiky, false)] {
+        let y: Vec<f64> = y.iter().map(|y| y + 0.001 * normal(&mut rng)).collect();
+        let training = vec![Stretch { record: 0, first: 0, end: SAMPLES / 2 }];
+        let options = DiagnosisOptions { training, linear_fit: true, ..DiagnosisOptions::default() };
+        let record = Record { input: &u[..y.len()], outputs: vec![&y] };
+        let found = diagnose(&[record], 1.0 / RATE_HZ, &options).expect("a diagnosis").diagnosis;
+        let others = names(&found).into_iter().any(|id| id != "intersample");
+        assert_eq!((found.verdict != Verdict::Unexplained, others), (is_linear, false), "{found:?}");
+    }
+}

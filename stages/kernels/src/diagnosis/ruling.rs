@@ -205,7 +205,8 @@ impl Grounds {
         (before > noise).then(|| (before - alone().unwrap_or(after)) / (before - noise))
     }
 
-    fn disagreement(&self) -> Option<String> {
+    /// What says that what was held out does not agree with what was fitted; none where it does.
+    pub(super) fn disagreement(&self) -> Option<String> {
         let [_, after] = self.held_out?;
         let training = self.training?;
         let disagree = after.is_nan() || after > AGREES * training;
