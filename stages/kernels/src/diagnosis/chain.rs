@@ -41,9 +41,9 @@ pub(super) struct Chain {
 ///
 /// # Method
 /// [`fit_block_oriented`] with the curve at either end and between two parts, at the ends from the poles and zeros of the
-/// latter, too; the simplest that does has to be one that may be named. It is judged on the first part, or on the last quarter of the stretch, which then takes no share in the fit.
-/// There its error is below that of the linear model by [`SHARE`] and
-/// below that of the extended model: where causes describe the data as well, no curve is named beside them.
+/// latter, too; the simplest that does has to be one that may be named. It is judged on the first part, or on the last
+/// quarter of the stretch, which then takes no share in the fit. There its error is below that of the linear model by
+/// [`SHARE`] and below that of the extended model: where causes describe the data as well, no curve is named beside them.
 ///
 /// `simulated`: by the linear and by the extended model, of the stretch, in the output's unit.
 pub(super) fn chain(

@@ -113,9 +113,10 @@ impl Grounds {
     /// # Method
     /// A name stands if it lowers the error of what was held out, by more than half of what the answer's model leaves
     /// beyond noise, where it was fitted or held out, whichever is less. `named` if a name stands, the names alone miss at
-    /// most a twentieth of what all causes take and account for half of what is left beyond noise, the model is adequate, nothing systematic is left, and the answer's error
-    /// on what was held out is below the linear model's. `clean` if there is no cause, and neither a test nor the held-out
-    /// error contradicts, and what is left scatters as noise does. Else `unexplained`.
+    /// most a twentieth of what all causes take and account for half of what the linear model leaves beyond noise, the model
+    /// is adequate, nothing systematic is left, and the answer's error on what was held out is below the linear model's.
+    /// `clean` if there is no cause, neither a test nor the held-out error contradicts, and what is left scatters as noise
+    /// does. Else `unexplained`.
     ///
     /// `alone`: mean square on what was held out of a model with these claims alone, refitted; none where it is not known.
     pub fn ruling(&self, alone: &dyn Fn(&[usize]) -> Option<f64>) -> Ruling {
