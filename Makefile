@@ -114,8 +114,12 @@ sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
 .tools/cargo-cyclonedx/bin/cargo-cyclonedx:
 	cargo install --quiet --locked --root .tools/cargo-cyclonedx --version $(CARGO_CYCLONEDX_VERSION) cargo-cyclonedx
 
+# Two makes at once may both want it: `python3 -m venv` fails where the folder appears while it makes it.
+.tools/:
+	mkdir -p $@
+
 # HDF5 is built from source and wants CMake >= 3.26; PyPI's is newer than many systems'.
-.tools/bin/cmake:
+.tools/bin/cmake: | .tools/
 	python3 -m venv .tools
 	.tools/bin/python -m pip install --quiet --disable-pip-version-check cmake==$(CMAKE_VERSION)
 
@@ -123,7 +127,7 @@ sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
 	.tools/bin/python -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
 	touch .tools/readers
 
-.tools/wheel/installed: tests/wheel/requirements.txt
+.tools/wheel/installed: tests/wheel/requirements.txt | .tools/
 	python3 -m venv .tools/wheel
 	.tools/wheel/bin/python -m pip install --quiet --disable-pip-version-check -r tests/wheel/requirements.txt
 	touch $@
@@ -133,7 +137,7 @@ sbom: .tools/cargo-cyclonedx/bin/cargo-cyclonedx
 	touch $@
 
 # Apart from the readers: its dependencies are many.
-.tools/snakemake/installed: tests/interop.txt
+.tools/snakemake/installed: tests/interop.txt | .tools/
 	python3 -m venv .tools/snakemake
 	.tools/snakemake/bin/python -m pip install --quiet --disable-pip-version-check -r tests/interop.txt
 	touch $@
