@@ -73,8 +73,12 @@ pub(super) struct Measured<'a> {
 impl CausesDiagnose {
     /// A measured input and output.
     pub(super) fn forced<'a>(&self, pair: &Pair<'_>, whole: &'a Restored) -> Result<Measured<'a>, StageError> {
-        let (rate, input, output) = (pair.sample_rate_hz()?, &whole.input[..], &whole.output[..]);
-        let learnt = identification(pair, rate)?;
+        let rate = pair.sample_rate_hz()?;
+        let learnt = stretch(pair, DataSet::Identification, rate)?;
+        // what lies behind both stretches was set apart, behind a gap in time for one
+        let judged = stretch(pair, DataSet::Verification, rate).map_or(whole.output.len(), |judged| judged.end);
+        let end = self.parts.iter().map(|part| part.end).fold(learnt.end.max(judged), usize::max);
+        let [input, output] = [&whole.input, &whole.output].map(|all| &all[..end.min(all.len())]);
         let [input_unit, output_unit] = pair.units()?.map(str::to_owned);
         let part = |part: &JudgedPart| Part {
             name: part.name.clone(),
@@ -201,9 +205,9 @@ impl Measured<'_> {
     }
 }
 
-/// Samples of the identification stretch, counted from the first of all.
-pub(super) fn identification(pair: &Pair<'_>, rate_hz: f64) -> Result<std::ops::Range<usize>, StageError> {
-    let own = pair.own_time(DataSet::Identification)?;
+/// Samples of a stretch, counted from the first of all.
+pub(super) fn stretch(pair: &Pair<'_>, set: DataSet, rate_hz: f64) -> Result<std::ops::Range<usize>, StageError> {
+    let own = pair.own_time(set)?;
     let first = own.first().zip(pair.time()?.first()).map_or(0.0, |(a, b)| ((a - b) * rate_hz).round()) as usize;
     Ok(first..first + own.len())
 }

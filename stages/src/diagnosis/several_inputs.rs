@@ -4,8 +4,8 @@ use afmid_kernels::diagnosis::{Story, halves, linear_only};
 use afmid_pipeline::{Context, StageError};
 
 use super::causes_stage::{Answer, CausesDiagnose, simulation};
-use super::runs::identification;
-use crate::artifacts::Pair;
+use super::runs::stretch;
+use crate::artifacts::{DataSet, Pair};
 use crate::watched::Watched;
 
 /// The verdict on a linear model of all inputs, one or several; no cause is tried.
@@ -27,7 +27,7 @@ pub(super) fn answer(
         ));
     }
     let part = stage.parts.first();
-    let learnt = identification(pair, rate)?;
+    let learnt = stretch(pair, DataSet::Identification, rate)?;
     let (learnt, held_out) = halves(learnt, part.map(|part| part.first..part.end), output.len());
     let found = linear_only(&inputs, output, learnt, held_out.clone(), 1.0 / rate, &Watched(cx))
         .map_err(StageError::from_error)?;

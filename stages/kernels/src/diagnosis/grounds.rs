@@ -14,9 +14,15 @@ use crate::validation::{Driven, Feedback, feedback};
 
 /// Nepers over the longest stretch below which nothing is known of a damping: of an error of a thousandth a share.
 const ENDLESS: f64 = 1e-3;
-/// Loss of an exponential over that of another within one another's width, at which it may be what the square of the other's
-/// amplitude makes of its frequency or damping: three times, as far as other terms let it be seen.
-const COMPANION: std::ops::Range<f64> = 2.5..3.5;
+/// Loss of an exponential over that of another within one another's width, at which it may be what the other's amplitude
+/// makes of its frequency or damping: twice of its first power, three times of its square, as far as other terms let it
+/// be seen.
+const COMPANION: std::ops::Range<f64> = 1.7..3.5;
+/// Highest multiple of a mode's frequency that a curve makes clearly, how near a mode lies to it, relative, and its loss
+/// per second over that many times the other's.
+const HARMONIC: usize = 3;
+const NEAR: f64 = 0.005;
+const ALIKE: std::ops::Range<f64> = 0.7..1.4;
 
 impl Findings<'_> {
     /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
@@ -121,25 +127,40 @@ impl Findings<'_> {
         feedback(&stretches?)
     }
 
-    /// Two modes of free decays with causes that one mode makes which moves with its amplitude, in a sentence; none where there
-    /// are none.
+    /// Two modes of free decays, beside causes, that one mode makes which moves with its amplitude or is seen through a
+    /// curve, in a sentence; none where there are none.
     fn companion(&self) -> Option<String> {
         let last = &self.choice.ladder.last()?.fit.model;
         if self.bench.driven || last.causes.is_empty() {
             return None;
         }
         let modes = || last.dynamics.sections.iter().filter(|section| section.kind == Kind::Oscillator);
+        let width = |of: &Section| of.loss * of.frequency_hz;
         let beside = |a: &Section, b: &Section| {
-            (a.frequency_hz - b.frequency_hz).abs() < 0.5 * (a.loss * a.frequency_hz + b.loss * b.frequency_hz)
+            (a.frequency_hz - b.frequency_hz).abs() < 0.5 * (width(a) + width(b))
+                && COMPANION.contains(&(width(b) / width(a)))
         };
-        let (slow, fast) = modes()
-            .flat_map(|a| modes().map(move |b| (a, b)))
-            .find(|(a, b)| COMPANION.contains(&(b.loss / a.loss)) && beside(a, b))?;
-        Some(format!(
-            "of two modes at {:.4} and {:.4} Hz one dies away three times as fast: one mode that moves with the square of its \
-             amplitude makes both, and causes beside them stand for its law",
-            slow.frequency_hz, fast.frequency_hz
-        ))
+        let multiple = |a: &Section, b: &Section| {
+            (2..=HARMONIC).find(|n| {
+                let n = *n as f64;
+                (b.frequency_hz / a.frequency_hz - n).abs() < NEAR * n && ALIKE.contains(&(width(b) / width(a) / n))
+            })
+        };
+        let mut pairs = modes().flat_map(|a| modes().map(move |b| (a, b)));
+        pairs.find_map(|(slow, fast)| {
+            let said = match multiple(slow, fast) {
+                Some(n) => format!("at {n} times the frequency: what a curve makes of the other's motion"),
+                None if beside(slow, fast) => "within its width: one mode that moves with its amplitude makes both".to_owned(),
+                None => return None,
+            };
+            Some(format!(
+                "of two modes at {:.4} and {:.4} Hz the second dies away {:.1} times as fast, {said}; causes beside them \
+                 stand for its law",
+                slow.frequency_hz,
+                fast.frequency_hz,
+                width(fast) / width(slow)
+            ))
+        })
     }
 
     /// The linear model's one mode, where it does not die away in a measured input and output, in a sentence.

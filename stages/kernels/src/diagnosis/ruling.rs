@@ -13,6 +13,9 @@ const BESIDE: f64 = 0.05;
 /// Share of the squared error that a linear model leaves beyond noise which names together have to account for. Why: less
 /// is a part of something else.
 const ACCOUNTED: f64 = 0.5;
+/// Names of one model up to which it may leave what is no noise. Why: of measured systems five were found; more that do not
+/// account for all are parts of one law that is not among them.
+const MANY: usize = 5;
 /// Mean square on held-out data over that of training from which on they do not agree: an error twice as large. Why not
 /// less: a part to judge on begins in a state that few samples tell.
 const AGREES: f64 = 4.0;
@@ -116,7 +119,7 @@ impl Grounds {
     /// most a twentieth of what all causes take and account for half of what the linear model leaves beyond noise, the model
     /// is adequate, nothing systematic is left, and the answer's error on what was held out is below the linear model's.
     /// `clean` if there is no cause, neither a test nor the held-out error contradicts, and what is left scatters as noise
-    /// does. Else `unexplained`.
+    /// does. Else `unexplained`, as with more than five names that leave what is no noise.
     ///
     /// `alone`: mean square on what was held out of a model with these claims alone, refitted; none where it is not known.
     pub fn ruling(&self, alone: &dyn Fn(&[usize]) -> Option<f64>) -> Ruling {
@@ -142,6 +145,14 @@ impl Grounds {
             let against: Vec<String> = tests.chain(self.disagreement()).collect();
             let found = if against.is_empty() { Verdict::Clean } else { Verdict::Unexplained };
             return verdict(found, Vec::new(), against);
+        }
+        if self.claims.len() > MANY && !self.unlike_noise.is_empty() {
+            let said = format!(
+                "{} causes, and what they leave is no noise: they stand for a law that is not among them",
+                self.claims.len()
+            );
+            let because = self.unlike_noise.iter().cloned().chain([said]).collect();
+            return verdict(Verdict::Unexplained, Vec::new(), because);
         }
         let (mut stand, mut fallen) = (Vec::new(), Vec::new());
         for (number, claim) in self.claims.iter().enumerate() {
@@ -309,6 +320,17 @@ mod tests {
         assert_eq!((left_beyond_noise(0.019), left_beyond_noise(f64::NAN), left_repeating(1.9)), (None, None, None));
         assert!(left_beyond_noise(0.26).is_some_and(|said| said.contains("26.0 % of the output's variance")));
         assert!(left_repeating(28.0).is_some_and(|said| said.contains("28.0 times")));
+    }
+
+    #[test]
+    fn many_names_that_leave_no_noise_are_none() {
+        let of = |count: usize, unlike_noise: Vec<String>| {
+            let claims = (0..count).map(|number| claim(&number.to_string(), [9.0, 1.0])).collect();
+            Grounds { claims, held_out: Some([9.0, 1.0]), unlike_noise, ..fine() }.ruling(&|_| None).verdict
+        };
+        let said = || vec!["it follows the motion".to_owned()];
+        assert_eq!([of(5, said()), of(6, Vec::new())], [Verdict::Named; 2]);
+        assert_eq!(of(6, said()), Verdict::Unexplained);
     }
 
     #[test]

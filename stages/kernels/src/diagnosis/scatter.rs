@@ -33,12 +33,19 @@ const ALONE: f64 = 7.0;
 const FEW: f64 = 0.01;
 const MUCH: f64 = 0.25;
 
+/// Share of a block's samples, the largest, that its mean square is without: one far out is not what happens in a block.
+const TRIMMED: f64 = 0.02;
+/// Standard deviations, from the median, at which a sample is cut off before memory and kurtosis are looked at.
+const CUT: f64 = 4.0;
+/// Lags over which the memory is looked at: noise with a time constant of twenty samples has forgotten by then.
+const MEMORY: usize = 64;
+
 /// Standard deviation of a normal variable over the median of its absolute value.
 const OF_MEDIAN: f64 = 1.4826;
 
 /// A piece of a channel of a stretch.
 struct Block {
-    /// Mean square of what is left.
+    /// Mean square of what is left but for the largest samples.
     left: f64,
     /// Mean square of the simulation about its mean over the stretch.
     motion: f64,
@@ -50,11 +57,13 @@ struct Block {
 ///
 /// # Method
 /// Samples beyond seven standard deviations (from the median) that have a quarter of the squared error; else mean squares
-/// of blocks: the quarter with the largest motion against the half with the least, and the largest against the median. F
-/// tests, as many degrees of freedom as independent samples would have whose variance is known as well: of first-order
-/// autocorrelation `r`, a share `(1 - r^2) / (1 + r^2)`.
+/// of blocks without their largest samples: the quarter with the largest motion against the half with the least, and the
+/// largest against the median. F tests, as many degrees of freedom as independent normal samples would have whose variance
+/// is known as well: of autocorrelations `r_k` and kurtosis `g` a share `1 / (1 + 2 sum r_k^2) * 2 / (g - 1)`, both of what
+/// is left cut off at four standard deviations.
 /// # Source
-/// M. S. Bartlett, J. R. Stat. Soc. 98 (1935) 536, for that share.
+/// M. S. Bartlett, J. R. Stat. Soc. Suppl. 8 (1946) 27, for that share; P. J. Huber, Robust Statistics (1981), for what is
+/// cut off.
 pub(super) fn unlike_noise(all: &[Compared<'_>], interval_s: f64) -> Vec<String> {
     let left: Vec<Vec<f64>> = all.iter().map(|one| difference(one)).collect();
     let blocks = blocks(all, &left);
@@ -121,14 +130,15 @@ fn blocks(all: &[Compared<'_>], left: &[Vec<f64>]) -> Vec<Block> {
         let own = (BLOCKS * samples).checked_div(total).unwrap_or(0).clamp(1, (samples / LEAST_BLOCK).max(1));
         for b in 0..own {
             let range = b * samples / own..(b + 1) * samples / own;
-            let (mut square, mut motion, mut count) = (0.0, 0.0, 0.0);
+            let mut squares = Vec::new();
+            let (mut motion, mut count) = (0.0, 0.0);
             for (e, s) in left[range.clone()].iter().zip(&one.simulated[range]).filter(|(e, _)| e.is_finite()) {
-                square += e * e;
+                squares.push(e * e);
                 motion += (s - mean).powi(2);
                 count += 1.0;
             }
             if count >= 1.0 {
-                blocks.push(Block { left: square / count, motion: motion / count, count });
+                blocks.push(Block { left: trimmed(squares), motion: motion / count, count });
             }
         }
     }
@@ -157,15 +167,47 @@ fn alone(left: &[Vec<f64>], least: f64) -> Option<String> {
     })
 }
 
-/// Share of samples that count as independent for a mean square.
+/// Mean of squares without the largest.
+fn trimmed(mut squares: Vec<f64>) -> f64 {
+    squares.sort_by(f64::total_cmp);
+    let largest = (TRIMMED * squares.len() as f64).ceil() as usize;
+    // of a single one there is no other
+    let kept = &squares[..(squares.len() - largest).max(1)];
+    kept.iter().sum::<f64>() / kept.len() as f64
+}
+
+/// A row with what lies far out cut off.
+fn cut_off(row: &[f64]) -> Vec<f64> {
+    let mut sizes: Vec<f64> = row.iter().filter(|e| e.is_finite()).map(|e| e.abs()).collect();
+    let limit = CUT * OF_MEDIAN * median(&mut sizes);
+    // a row of which more than half is nothing has no scale
+    row.iter().map(|e| if limit > 0.0 { e.clamp(-limit, limit) } else { *e }).collect()
+}
+
+/// Share of samples that count as independent normal ones for a mean square.
 fn independent(left: &[Vec<f64>]) -> f64 {
-    let (mut square, mut next) = (0.0, 0.0);
-    for pair in left.iter().flat_map(|row| row.windows(2)).filter(|pair| pair.iter().all(|e| e.is_finite())) {
-        square += pair[0] * pair[0];
-        next += pair[0] * pair[1];
+    let mut products = [0.0; MEMORY + 1];
+    let mut counts = [0.0; MEMORY + 1];
+    let mut fourth = 0.0;
+    for row in left.iter().map(|row| cut_off(row)) {
+        fourth += row.iter().filter(|e| e.is_finite()).map(|e| e.powi(4)).sum::<f64>();
+        for lag in 0..=MEMORY.min(row.len().saturating_sub(1)) {
+            for product in row[lag..].iter().zip(&row).map(|(a, b)| a * b).filter(|product| product.is_finite()) {
+                products[lag] += product;
+                counts[lag] += 1.0;
+            }
+        }
     }
-    let r = if square > 0.0 { (next / square).clamp(-1.0, 1.0) } else { 0.0 };
-    (1.0 - r * r) / (1.0 + r * r)
+    let variance = products[0] / counts[0];
+    // nothing is left, or nothing is there
+    if variance.is_nan() || variance <= 0.0 {
+        return 1.0;
+    }
+    let of = |(product, count): (&f64, &f64)| if *count > 0.0 { (product / count / variance).powi(2) } else { 0.0 };
+    let memory: f64 = products[1..].iter().zip(&counts[1..]).map(of).sum();
+    // that of normal noise is 3
+    let kurtosis = (fourth / counts[0] / (variance * variance)).max(3.0);
+    2.0 / (1.0 + 2.0 * memory) / (kurtosis - 1.0)
 }
 
 #[cfg(test)]
@@ -194,6 +236,31 @@ mod tests {
                 // some periods of one frequency, and a decay over seven time constants
                 assert_eq!(said(&decay(0.0), &|k| noise[k]), Vec::<String>::new(), "seed {seed}");
                 assert_eq!(said(&decay(7.0), &|k| noise[k]), Vec::<String>::new(), "seed {seed}");
+            }
+        }
+    }
+
+    /// Noise of Student's law with four degrees of freedom, and what wanders over all time scales of a record.
+    #[test]
+    fn noise_with_heavy_tails_or_a_long_memory_is_noise() {
+        for seed in 0..100 {
+            let parts: Vec<Vec<f64>> = (0..5).map(|part| white_noise(SAMPLES, 1.0, 1000 + 5 * seed + part)).collect();
+            let student = |k: usize| {
+                let square: f64 = parts[1..].iter().map(|part| part[k] * part[k]).sum();
+                0.01 * parts[0][k] / (0.25 * square).sqrt()
+            };
+            // poles a factor of four apart: about 1/f
+            let mut wandering = vec![0.0; SAMPLES];
+            for (pole, white) in [0.6, 0.9, 0.975, 0.994_f64].iter().zip(&parts) {
+                let mut state = 0.0;
+                for (sum, white) in wandering.iter_mut().zip(white) {
+                    state = pole * state + 0.003 * (1.0 - pole * pole).sqrt() * white;
+                    *sum += state;
+                }
+            }
+            for motion in [decay(0.0), decay(7.0)] {
+                assert_eq!(said(&motion, &student), Vec::<String>::new(), "seed {seed}");
+                assert_eq!(said(&motion, &|k| wandering[k]), Vec::<String>::new(), "seed {seed}");
             }
         }
     }

@@ -108,7 +108,7 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
     let basis = Basis::new(fit);
     let trials: Vec<(&Candidate, Vec<f64>)> = candidates
         .iter()
-        .filter(|candidate| !fit.model.has(candidate.cause, &candidate.modes))
+        .filter(|candidate| recurs(candidate.cause) || !fit.model.has(candidate.cause, &candidate.modes))
         .flat_map(|candidate| candidate.cause.trials(&scene).into_iter().map(move |trial| (candidate, trial)))
         .filter(|(candidate, trial)| {
             !frequency(candidate.cause, trial).is_some_and(|frequency_hz| is_own(bench, fit, frequency_hz))
@@ -151,6 +151,12 @@ const REFINED: usize = 5;
 /// The frequency among a cause's values.
 fn frequency(cause: &dyn Cause, values: &[f64]) -> Option<f64> {
     cause.about().parameters.iter().zip(values).find(|(parameter, _)| parameter.unit == "Hz").map(|(_, value)| *value)
+}
+
+/// Whether there may be several of a cause: of what is added to a record at a frequency of its own.
+fn recurs(cause: &dyn Cause) -> bool {
+    let about = cause.about();
+    about.part == Part::Record && about.parameters.iter().any(|parameter| parameter.unit == "Hz")
 }
 
 /// Largest multiple of a mode's frequency that a nonlinear motion still shows.
@@ -290,7 +296,7 @@ pub(super) fn significance(sample: &Sample<'_>, model: &Model, which: usize, gai
     let direction: Vec<f64> =
         (0..without.len()).map(|k| if bench.output[k].is_finite() { with[k] - without[k] } else { 0.0 }).collect();
     // the cause's own sensitivities don't count as the others'
-    let known = fit.model.has(added.cause, &added.modes);
+    let known = fit.model.causes.get(which).is_some_and(|own| own.is(added.cause, &added.modes));
     let own = if known { fit.model.places(which) } else { 0..0 };
     // a motion that diverges without the cause leaves its sensitivity to compare with
     let direction = match own.clone().next().and_then(|place| fit.sensitivities.get(place)) {

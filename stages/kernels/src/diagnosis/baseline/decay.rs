@@ -10,7 +10,7 @@ use crate::ringdown::{ChannelOptions, Motion, RecordFit, follow_channels};
 /// Most modes of a structure: the library of general terms grows with their square.
 const MOST: usize = 6;
 
-/// The strongest one, two, ... modes of all stretches together; none where no decay is found.
+/// The strongest one, two, ... modes of all stretches together; offsets alone where no decay is found.
 ///
 /// Modes that lie within one another's bandwidth are offered as one first: a mode that does not decay exponentially is
 /// followed by two exponentials, and it is that mode's law that has to be found.
@@ -18,7 +18,7 @@ const MOST: usize = 6;
 /// Beside them the least number of modes that a baseline needs: the strong ones, none of which can be made by another.
 pub(super) fn starts(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> (Vec<Modal>, usize) {
     let Some(Found { all, strength, amplitude, shadow }) = modes(records, bench, options) else {
-        return (Vec::new(), 1);
+        return (vec![nothing(bench, options)], 1);
     };
     let mut order: Vec<usize> = (0..strength.len()).collect();
     order.sort_by(|a, b| shadow[*a].cmp(&shadow[*b]).then(strength[*b].total_cmp(&strength[*a])));
@@ -87,11 +87,7 @@ fn modes(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> O
         let record = found.records.iter().find(|r| r.event == largest && r.channel == channel);
         record.map_or(c64::new(0.0, 0.0), |r| r.residues[mode] / bench.output_scale[channel])
     };
-    let mut modal = Modal::sum(Vec::new(), options.sensed(0), false, bench.interval_s);
-    modal.offsets = true;
-    modal.weights = vec![Vec::new(); channels];
-    modal.sensed = (0..channels).map(|channel| options.sensed(channel)).collect();
-    modal.free = if channels > 1 { Weights::Shapes } else { Weights::Fixed };
+    let mut modal = nothing(bench, options);
     let moves = |mode: usize| followed.course.iter().any(|course| course.mode == mode && course.moves);
     let square = |mode: usize| (0..channels).map(|channel| residue(mode, channel).norm_sqr()).sum::<f64>();
     let strength: Vec<f64> = (0..found.poles.len()).map(|mode| square(mode) / -found.poles[mode].re).collect();
@@ -138,6 +134,17 @@ fn modes(records: &[Record<'_>], bench: &Bench, options: &DiagnosisOptions) -> O
         }
     }
     (!modal.sections.is_empty()).then_some(Found { all: modal, strength, amplitude, shadow })
+}
+
+/// Offsets of all channels without any mode.
+fn nothing(bench: &Bench, options: &DiagnosisOptions) -> Modal {
+    let channels = bench.layout.channels;
+    let mut modal = Modal::sum(Vec::new(), options.sensed(0), false, bench.interval_s);
+    modal.offsets = true;
+    modal.weights = vec![Vec::new(); channels];
+    modal.sensed = (0..channels).map(|channel| options.sensed(channel)).collect();
+    modal.free = if channels > 1 { Weights::Shapes } else { Weights::Fixed };
+    modal
 }
 
 /// Whether an exponential at that ratio of frequencies follows a stronger mode that moves with its amplitude: beside it,
