@@ -100,6 +100,12 @@ pub enum Command {
         result: PathBuf,
         /// The stage, or STAGE.PORT, one of its artifacts; without it, the run as a whole.
         id: Option<String>,
+        /// Of a stage with modes all it has, not their table alone.
+        #[arg(long)]
+        all: bool,
+        /// The table of that stage, or STAGE.PORT, as comma-separated values, alone on stdout.
+        #[arg(long, requires = "id", conflicts_with_all = ["all", "json"])]
+        csv: bool,
         /// As JSON, alone on stdout.
         #[arg(long)]
         json: bool,
@@ -254,10 +260,10 @@ pub struct RunArgs {
     /// The config and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
-    /// What it runs on instead of `records.files`: files, folders or patterns, from the working directory.
+    /// What it runs on instead of the files of `records` or `data`: files, folders or patterns, from the working directory.
     pub files: Vec<String>,
-    /// The result file, in a folder that is there; of a config with [sweep], the folder of the results [default: the
-    /// pipeline's name, in the working directory].
+    /// The result file; of a config with [sweep], the folder of the results [default: the
+    /// config's file name, in the working directory].
     #[arg(short, long, value_name = "OUT.h5")]
     pub output: Option<PathBuf>,
     /// Threads [default: one per processor]; results don't depend on it.
@@ -287,9 +293,12 @@ fn threads(text: &str) -> Result<NonZeroU16, String> {
 pub struct ReportArgs {
     /// The result file.
     pub result: PathBuf,
-    /// The page, in a folder that is there [default: the result file's name with `.html`, in the working directory].
+    /// The page [default: the result file's name with `.html`, in the working directory].
     #[arg(short, long, value_name = "REPORT.html")]
     pub output: Option<PathBuf>,
+    /// What the page is headed by [default: the pipeline's name and the first files].
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
     /// Also write every figure as an SVG file into this folder.
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,

@@ -84,7 +84,7 @@ pub fn inspect_json(path: &Path) -> String {
 
 /// The page that `report` writes, of a run that is in no file. Errors: its template does not go through.
 pub fn page(run: &RunResult) -> Result<String, String> {
-    report::report(run, &|_| String::new()).map_err(|error| error.to_string())
+    report::report(run, &|_| String::new(), None).map_err(|error| error.to_string())
 }
 
 /// Runs a config in this process with these stages, as `run` does, and writes its result file. Errors: what the command

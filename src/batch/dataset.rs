@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use afmid_pipeline::runner::failed_place;
-use afmid_pipeline::toml;
+use afmid_pipeline::{Plan, toml};
 
 use crate::relative::literally;
 
@@ -13,7 +13,7 @@ use crate::relative::literally;
 pub struct DataSet {
     /// Its logical name: that of its result file.
     pub name: String,
-    /// What replaces `records.files`: absolute.
+    /// What replaces the files that the config names: absolute.
     pub files: Vec<String>,
     /// Further `--set` arguments.
     pub set: Vec<String>,
@@ -25,37 +25,84 @@ const RESERVED: [&str; 2] = ["summary", "ledger"];
 const LONGEST: usize = 180;
 
 impl DataSet {
-    /// A folder of records. Errors: it is none; its name cannot be a file's.
-    pub fn of_folder(folder: &Path) -> Result<Self, String> {
-        if !folder.is_dir() {
-            let what = if folder.exists() { "a file" } else { "not there" };
-            return Err(format!("{} is {what}, wanted a folder of records", folder.display()));
+    /// A folder of records, or a record alone, by the name of the folder or of the file without its ending. Errors: it is
+    /// not there; its name cannot be a file's.
+    pub fn of_path(path: &Path) -> Result<Self, String> {
+        if !path.exists() {
+            return Err(format!("{} is not there, wanted a folder of records or a file", path.display()));
+        }
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            return Err(format!("{} is a config, wanted a folder of records or a file", path.display()));
         }
         // `.` and `..` have no last part of their own
-        let whole = folder.canonicalize().map_err(|error| format!("{}: {error}", folder.display()))?;
-        let name = whole.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        check_name(&name).map_err(|problem| format!("{}: {problem}", folder.display()))?;
-        Ok(Self { name, files: vec![absolute(&folder.to_string_lossy())?], set: Vec::new() })
+        let whole = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
+        let name = if path.is_dir() { whole.file_name() } else { path.file_stem() };
+        let name = name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        check_name(&name).map_err(|problem| format!("{}: {problem}", path.display()))?;
+        Ok(Self { name, files: vec![absolute(&path.to_string_lossy())?], set: Vec::new() })
     }
 
-    /// The `--set` arguments of its run, after those of the whole batch.
-    pub fn arguments(&self) -> Vec<String> {
-        let mut arguments = vec![records_are(&self.files)];
-        arguments.extend(self.set.iter().cloned());
-        arguments
+    /// The `--set` arguments of its run, after those of the whole batch. Errors: it is several files, and the config reads
+    /// one.
+    pub fn arguments(&self, replaced: Replaced) -> Result<Vec<String>, String> {
+        let files =
+            replaced.argument(&self.files).map_err(|problem| format!("the data set `{}`: {problem}", self.name))?;
+        Ok(std::iter::once(files).chain(self.set.iter().cloned()).collect())
     }
 }
 
-/// The `--set` argument that replaces `records.files` by files, folders or patterns of the working directory. Errors:
-/// there is none.
-pub fn records_in(files: &[String]) -> Result<String, String> {
-    let files: Vec<String> = files.iter().map(|file| absolute(file)).collect::<Result<_, String>>()?;
-    Ok(records_are(&files))
+/// What of a config other files take the place of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Replaced {
+    /// `files` of the stage `records`.
+    Records,
+    /// `files` of the stage `data`: hits or takes.
+    Hits,
+    /// `file` of the stage `data`: one measurement.
+    File,
 }
 
-fn records_are(files: &[String]) -> String {
-    let files = files.iter().map(|file| toml::Value::String(file.clone())).collect();
-    format!("records.files={}", toml::Value::Array(files))
+impl Replaced {
+    /// None of a plan that reads no files of this kind.
+    pub fn of(plan: &Plan) -> Option<Self> {
+        if plan.node("records").is_some() {
+            return Some(Self::Records);
+        }
+        let files = plan.node("data")?.params.get("files").and_then(serde_json::Value::as_array);
+        Some(if files.is_some_and(|files| !files.is_empty()) { Self::Hits } else { Self::File })
+    }
+
+    /// The `--set` argument that puts files, folders or patterns there. Errors: several, where one file is read.
+    pub fn argument(self, files: &[String]) -> Result<String, String> {
+        let list = || toml::Value::Array(files.iter().map(|file| toml::Value::String(file.clone())).collect());
+        match self {
+            Self::Records => Ok(format!("records.files={}", list())),
+            Self::Hits => Ok(format!("data.files={}", list())),
+            Self::File => Ok(format!("data.file={}", toml::Value::String(one(files)?))),
+        }
+    }
+}
+
+/// The one file that is named, or that a folder holds. Errors: there are more, or none.
+fn one(files: &[String]) -> Result<String, String> {
+    let [path] = files else {
+        return Err(format!("{} files, and the config reads one: make each a data set", files.len()));
+    };
+    if !Path::new(path).is_dir() {
+        return Ok(path.clone());
+    }
+    let listed = std::fs::read_dir(path).map_err(|error| format!("{path}: {error}"))?;
+    let mut found: Vec<PathBuf> = listed.flatten().map(|entry| entry.path()).filter(|file| file.is_file()).collect();
+    match (found.pop(), found.len()) {
+        (Some(file), 0) => Ok(file.to_string_lossy().into_owned()),
+        (Some(_), more) => Err(format!("{path} holds {} files, and the config reads one: name the files", more + 1)),
+        (None, _) => Err(format!("{path} holds no file")),
+    }
+}
+
+/// Files, folders or patterns of the working directory, absolute. Errors: there is none.
+pub fn all_absolute(files: &[String]) -> Result<Vec<String>, String> {
+    files.iter().map(|file| absolute(file)).collect()
 }
 
 /// Errors: why a name cannot be that of a result file.
@@ -151,7 +198,12 @@ mod tests {
 
     #[test]
     fn files_are_quoted_as_toml() {
-        assert_eq!(set("a").arguments(), ["records.files=['/a \"b\"/*.h5']", "fit.order=9"]);
+        let of = |replaced| set("a").arguments(replaced);
+        assert_eq!(of(Replaced::Records).unwrap(), ["records.files=['/a \"b\"/*.h5']", "fit.order=9"]);
+        assert_eq!(of(Replaced::Hits).unwrap()[0], "data.files=['/a \"b\"/*.h5']");
+        assert_eq!(of(Replaced::File).unwrap()[0], "data.file='/a \"b\"/*.h5'");
+        let two = DataSet { files: vec!["/a".to_owned(), "/b".to_owned()], ..set("a") };
+        assert!(two.arguments(Replaced::File).is_err_and(|problem| problem.contains("`a`: 2 files")));
     }
 
     #[test]

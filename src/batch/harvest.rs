@@ -26,6 +26,9 @@ pub struct Harvest {
     pub stiffness_n_per_m: Option<f64>,
     /// See there.
     pub stiffness_std_n_per_m: Option<f64>,
+    /// What its stages warned of, in their words, `stage: warning`.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Mechanical modes, ascending.
     pub modes: Vec<ModeFound>,
     /// Every number of the summaries that is in no list, as `stage.key.key`: of a point of a sweep, not of a data set.
@@ -45,6 +48,12 @@ pub struct ModeFound {
     pub quality_factor: Option<f64>,
     /// See there.
     pub quality_factor_std: Option<f64>,
+    /// Damping ratio and its standard error.
+    #[serde(default)]
+    pub damping_ratio: Option<f64>,
+    /// See there.
+    #[serde(default)]
+    pub damping_ratio_std: Option<f64>,
     /// Part of the static gain and its standard error.
     pub static_share: Option<f64>,
     /// See there.
@@ -75,6 +84,7 @@ pub fn harvest(run: &RunResult) -> Harvest {
         fit_held_out_percent: fit("held_out"),
         stiffness_n_per_m: stiffness("value"),
         stiffness_std_n_per_m: stiffness("std"),
+        warnings: run.stages.iter().flat_map(warnings).collect(),
         modes: modes.into_iter().flatten().map(mode).collect(),
         numbers: BTreeMap::new(),
     }
@@ -100,6 +110,10 @@ fn walk(path: &str, value: &Value, found: &mut BTreeMap<String, f64>) {
     }
 }
 
+fn warnings(stage: &StageRecord) -> impl Iterator<Item = String> + '_ {
+    stage.result.warnings.iter().map(|warning| format!("{}: {warning}", stage.id))
+}
+
 fn summary(stage: &StageRecord) -> Option<&Value> {
     match stage.result.outputs.artifact(SUMMARY)? {
         Artifact::Document(document) => Some(&document.0),
@@ -114,6 +128,8 @@ fn mode(value: &Value) -> ModeFound {
         frequency_std_hz: number("frequency_std_hz"),
         quality_factor: number("quality_factor"),
         quality_factor_std: number("quality_factor_std"),
+        damping_ratio: number("damping_ratio"),
+        damping_ratio_std: number("damping_ratio_std"),
         static_share: number("static_share"),
         static_share_std: number("static_share_std"),
     }

@@ -33,7 +33,7 @@ const HEAD: &[u8] = b"{\n  \"version\": ";
 const MOST_BYTES: u64 = 64 << 20;
 
 /// The layout that this version writes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 impl Entry {
     /// A run that failed.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::artifact::ColumnValues;
 use afmid_pipeline::files::FilledFolder;
 use afmid_pipeline::store::{ResultFile, write_result};
-use afmid_pipeline::{Ports, RunInfo, RunResult, Shaped, StageRecord, StageResult, Table};
+use afmid_pipeline::{Column, Ports, RunInfo, RunResult, Shaped, StageRecord, StageResult, Table};
 use serde_json::json;
 
 use super::harvest::ModeFound;
@@ -13,7 +13,7 @@ use super::ledger::Entry;
 use super::work::in_the_way;
 use super::{parquet, trends};
 use crate::failure::Failure;
-use crate::printable::printable;
+use crate::show::csv_text;
 
 /// A row per data set and mode; a set without modes has one row.
 pub fn table(entries: &[Entry]) -> Table {
@@ -49,6 +49,8 @@ pub fn table(entries: &[Entry]) -> Table {
         .with("frequency_std_hz", "Hz", "its standard error", mode(|mode| mode.frequency_std_hz))
         .with("quality_factor", "1", "quality factor", mode(|mode| mode.quality_factor))
         .with("quality_factor_std", "1", "its standard error", mode(|mode| mode.quality_factor_std))
+        .with("damping_ratio", "1", "damping ratio", mode(|mode| mode.damping_ratio))
+        .with("damping_ratio_std", "1", "its standard error", mode(|mode| mode.damping_ratio_std))
         .with("static_share", "1", "part of the static gain", mode(|mode| mode.static_share))
         .with("static_share_std", "1", "its standard error", mode(|mode| mode.static_share_std))
         .with("stiffness_n_per_m", "N/m", "spring constant", whole(|entry| entry.found.stiffness_n_per_m))
@@ -62,7 +64,57 @@ pub fn table(entries: &[Entry]) -> Table {
         .with("fit_held_out_percent", "1", "fit of the held-out half", whole(|entry| entry.found.fit_held_out_percent))
         .with("verdict", "", "of a diagnosis", text(&|entry| entry.found.verdict.as_deref()))
         .with("causes", "", "named by a diagnosis", text(&|entry| entry.found.causes.as_deref()))
+        .with(
+            "warnings",
+            "1",
+            "what its stages warned of, how often",
+            rows.iter().map(|(entry, ..)| entry.found.warnings.len() as i64).collect::<Vec<i64>>(),
+        )
+        .with(
+            "first_warning",
+            "",
+            "the first of these",
+            text(&|entry| entry.found.warnings.first().map(String::as_str)),
+        )
         .with("error", "", "why it failed", text(&|entry| entry.error.as_deref()))
+}
+
+/// Columns that people read at the terminal.
+const READ: [&str; 13] = [
+    "data_set",
+    "mode",
+    "frequency_hz",
+    "frequency_std_hz",
+    "quality_factor",
+    "quality_factor_std",
+    "damping_ratio",
+    "damping_ratio_std",
+    "stiffness_n_per_m",
+    "stiffness_std_n_per_m",
+    "verdict",
+    "causes",
+    "warnings",
+];
+
+/// What a person reads of [`table`] at the terminal: the columns in which something was found; no row of what failed.
+pub fn shown(entries: &[Entry]) -> Table {
+    let done: Vec<Entry> = entries.iter().filter(|entry| entry.is_done()).cloned().collect();
+    let any = done.iter().any(|entry| !entry.found.modes.is_empty());
+    let keep = |column: &Column| {
+        READ.contains(&&column.name[..]) && is_known(&column.values) && (any || column.name != "mode")
+    };
+    let columns = table(&done).columns.into_iter().filter(keep).collect();
+    Table { columns, ..Table::default() }
+}
+
+/// Whether anything is in a column.
+pub fn is_known(values: &ColumnValues) -> bool {
+    match values {
+        ColumnValues::Real(values) => values.iter().any(|value| value.is_finite()),
+        ColumnValues::Text(values) => values.iter().any(|value| !value.is_empty()),
+        ColumnValues::Integer(values) => values.iter().any(|value| *value != 0),
+        _ => true,
+    }
 }
 
 /// What identifies a summary.
@@ -87,7 +139,7 @@ pub struct Tables {
 }
 
 /// The table that says whose the others are.
-const SUMMARY: &str = "summary.h5";
+pub const SUMMARY: &str = "summary.h5";
 
 impl Tables {
     /// Sees, before anything runs, that no table of others would be replaced. `uses` is [`BATCH`] or [`SWEEP`].
@@ -116,7 +168,7 @@ impl Tables {
     }
 
     fn csv(&self, name: &str, table: &Table) -> Result<(), Failure> {
-        self.put(name, |path| csv(path, table))
+        self.put(name, |path| std::fs::write(path, csv_text(table)?))
     }
 
     fn parquet(&self, table: &Table) -> Result<(), Failure> {
@@ -191,52 +243,5 @@ fn result(title: &Title<'_>, uses: &str, outputs: Ports) -> RunResult {
         program: title.program.to_owned(),
         stages: vec![stage],
         info: RunInfo::default(),
-    }
-}
-
-/// Comma-separated, a header line, unknown numbers empty, numbers to the last bit. Text that a spreadsheet would take
-/// for a formula gets an apostrophe before it.
-fn csv(path: &Path, table: &Table) -> std::io::Result<()> {
-    let mut writer = csv::Writer::from_path(path).map_err(std::io::Error::other)?;
-    let line =
-        |writer: &mut csv::Writer<_>, fields: Vec<String>| writer.write_record(fields).map_err(std::io::Error::other);
-    line(&mut writer, table.columns.iter().map(|column| cell(&column.name)).collect())?;
-    for row in 0..table.rows() {
-        line(&mut writer, table.columns.iter().map(|column| field(&column.values, row)).collect())?;
-    }
-    writer.flush()
-}
-
-fn field(values: &ColumnValues, row: usize) -> String {
-    match values {
-        ColumnValues::Real(values) => values.get(row).filter(|value| value.is_finite()).map(f64::to_string),
-        ColumnValues::Integer(values) => values.get(row).map(i64::to_string),
-        ColumnValues::Flag(values) => values.get(row).map(bool::to_string),
-        ColumnValues::Text(values) => values.get(row).map(|text| cell(text)),
-    }
-    .unwrap_or_default()
-}
-
-/// Text that is no formula to a spreadsheet: one that begins as a formula, and is no number, gets an apostrophe. What
-/// acts or is not seen is an escape, as on a terminal: tables are printed, too.
-fn cell(text: &str) -> String {
-    let text = &*printable(text);
-    let formula = text.starts_with(['=', '+', '-', '@', '\t']) && text.parse::<f64>().is_err();
-    if formula { format!("'{text}") } else { text.to_owned() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::cell;
-
-    #[test]
-    fn a_spreadsheet_finds_no_formula() {
-        for text in ["=1+1", "+SUM(A1)", "-2+3", "@x", "\t=1", "-"] {
-            assert_eq!(cell(text), format!("'{text}"));
-        }
-        assert_eq!((cell("\r=1"), cell("a\u{202e}b\u{200b}")), ("\\x0d=1".into(), "a\\u{202e}b\\u{200b}".into()));
-        for text in ["", "a=b", "-2.5", "+3e4", "'=1", "lever-1"] {
-            assert_eq!(cell(text), text);
-        }
     }
 }

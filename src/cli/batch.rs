@@ -11,9 +11,9 @@ use crate::batch::shard::Shard;
 /// Data sets.
 #[derive(Debug, Args)]
 pub struct SetsArgs {
-    /// Data sets: folders of records, each a run of its own.
+    /// Data sets: folders of records, or files, each a run of its own.
     #[arg(value_name = "DATASET")]
-    pub folders: Vec<PathBuf>,
+    pub paths: Vec<PathBuf>,
     /// More data sets, one a line: {"name": "a", "files": ["a/*.h5"], "set": {"stage.param": 1}}.
     #[arg(long, value_name = "M.jsonl")]
     pub manifest: Vec<PathBuf>,
@@ -22,14 +22,14 @@ pub struct SetsArgs {
 /// What to run a config on, and how.
 #[derive(Debug, Args)]
 pub struct BatchArgs {
-    /// The config, with a stage `records`, and what changes it.
+    /// The config, with a stage `records` or `data`, and what changes it.
     #[command(flatten)]
     pub config: ConfigArgs,
     /// What to run it on.
     #[command(flatten)]
     pub sets: SetsArgs,
     /// Folder of the results (NAME.h5; of a data set that fails NAME.failed.h5, with the stages that went through), the
-    /// ledger and the summary [default: the pipeline's name, in the working directory].
+    /// ledger and the summary [default: the config's file name, in the working directory].
     #[arg(short, long, value_name = "FOLDER")]
     pub output: Option<PathBuf>,
     /// Data sets at once, and threads [default: one per processor]; results don't depend on it.

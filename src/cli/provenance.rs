@@ -17,6 +17,9 @@ pub struct DiffArgs {
     /// The second.
     #[arg(value_name = "B.h5")]
     pub b: PathBuf,
+    /// Every dataset that differs, by how much, and the hashes of files.
+    #[arg(long)]
+    pub all: bool,
     /// As JSON, alone on stdout.
     #[arg(long)]
     pub json: bool,

@@ -4,19 +4,19 @@ use std::io::{Error, ErrorKind};
 use std::path::Path;
 use std::time::Instant;
 
-use afmid_pipeline::Plan;
 use afmid_pipeline::files::read_regular;
 use afmid_pipeline::graph::Stages;
+use afmid_pipeline::{Artifact, Plan};
 use serde_json::json;
 
 use super::load::load;
-use super::run::{PROGRAM, default_output, open_cache, warn, written_folders};
+use super::run::{PROGRAM, default_folder, open_cache, warn, written_folders};
 use super::sweep::refuse;
 use super::target::make_folder;
-use crate::batch::dataset::{DataSet, sorted};
+use crate::batch::dataset::{DataSet, Replaced, sorted};
 use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::manifest;
-use crate::batch::summary::{BATCH, Tables, Title};
+use crate::batch::summary::{self, BATCH, Tables, Title};
 use crate::batch::work::{Done, Work, all};
 use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
@@ -24,14 +24,14 @@ use crate::interrupt;
 use crate::output::print;
 use crate::printable::{message, one_line, shown};
 use crate::progress::Sets;
-use crate::show::pretty;
+use crate::show::{artifact_text, pretty};
 
 /// Runs a config on every data set. One that fails stops no other; then the exit code is 3.
 pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let clock = Instant::now();
     let sets = data_sets(&args.sets)?;
     let whole = whole(&args.config, stages)?;
-    let folder = args.output.clone().unwrap_or_else(|| default_output(whole.name()).with_extension(""));
+    let folder = args.output.clone().unwrap_or_else(|| default_folder(&args.config.config));
     let ledger = ledger(&folder)?;
     // a shard writes none: the run with `--collect` does
     let tables = args.shard.is_none().then(|| Tables::open(&folder, BATCH)).transpose()?;
@@ -40,7 +40,7 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
     let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
     let table = tables.map(|tables| tables.write_batch(&title, &entries)).transpose()?;
-    print(&summary(args.json, &folder, &done, table.as_deref(), clock)?)?;
+    print(&outcome(args.json, &folder, &done, table.as_deref(), clock)?)?;
     match entries.iter().filter(|entry| !entry.is_done()).count() {
         0 => Ok(()),
         failed => Err(Failure::Partly(Message::Line(
@@ -57,11 +57,17 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
 /// The plan of the config alone. Errors, usage: what is wrong with it; it has no stage whose files a batch can replace.
 pub fn whole(config: &ConfigArgs, stages: &dyn Stages) -> Result<Plan, Failure> {
     let whole = load(&config.config, &config.set, stages)?;
-    if whole.node("records").is_none() {
-        let help = "a batch replaces `records.files`: give the stage that reads the recordings the id `records`";
-        return Err(Failure::usage("the config has no stage `records`", Some(help.to_owned())));
-    }
+    replaced(&whole)?;
     Ok(whole)
+}
+
+/// What the data sets replace. Errors, usage: the plan has no stage for it.
+fn replaced(whole: &Plan) -> Result<Replaced, Failure> {
+    Replaced::of(whole).ok_or_else(|| {
+        let help =
+            "a batch replaces the files of `records` or `data`: give the stage that reads the recordings that id";
+        Failure::usage("the config has no stage `records` or `data`", Some(help.to_owned()))
+    })
 }
 
 /// The largest manifest: millions of data sets.
@@ -70,8 +76,8 @@ const MOST_MANIFEST_BYTES: u64 = 1 << 30;
 /// All that were named. Errors, usage: everything that is wrong with them.
 pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
     let (mut sets, mut problems) = (Vec::new(), Vec::new());
-    for folder in &args.folders {
-        DataSet::of_folder(folder).map_or_else(|problem| problems.push(problem), |set| sets.push(set));
+    for path in &args.paths {
+        DataSet::of_path(path).map_or_else(|problem| problems.push(problem), |set| sets.push(set));
     }
     for file in &args.manifest {
         let shown = file.display().to_string();
@@ -86,7 +92,7 @@ pub fn data_sets(args: &SetsArgs) -> Result<Vec<DataSet>, Failure> {
         }
     }
     if problems.is_empty() && sets.is_empty() {
-        problems.push("no data sets are named, wanted folders or a manifest".to_owned());
+        problems.push("no data sets are named, wanted folders, files or a manifest".to_owned());
     }
     match sorted(sets) {
         Ok(sets) if problems.is_empty() => return Ok(sets),
@@ -103,8 +109,10 @@ pub fn planned<'a>(
     sets: impl Iterator<Item = &'a DataSet>,
     stages: &dyn Stages,
 ) -> Result<Vec<(&'a DataSet, Plan)>, Failure> {
+    let replaced = replaced(&load(&config.config, &config.set, stages)?)?;
     sets.map(|set| {
-        let arguments: Vec<String> = config.set.iter().cloned().chain(set.arguments()).collect();
+        let own = set.arguments(replaced).map_err(|problem| Failure::usage(problem, None))?;
+        let arguments: Vec<String> = config.set.iter().cloned().chain(own).collect();
         let plan = load(&config.config, &arguments, stages)?;
         refuse(&plan, "a batch runs one set of parameters on each data set")?;
         Ok((set, plan))
@@ -150,7 +158,7 @@ fn computed(args: &BatchArgs, sets: &[(&DataSet, Plan)], ledger: &Ledger) -> Res
     Ok(done)
 }
 
-fn summary(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {
+fn outcome(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock: Instant) -> Result<String, Failure> {
     let failed: Vec<&Entry> = done.iter().map(|done| &done.entry).filter(|entry| !entry.is_done()).collect();
     let ran = done.iter().filter(|done| done.took.is_some()).count();
     if json {
@@ -164,6 +172,7 @@ fn summary(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock
             "summary": table.map(|table| table.display().to_string()),
         }));
     }
+    let found = table_of(done);
     let mut text: String = failed
         .iter()
         .map(|entry| {
@@ -178,8 +187,22 @@ fn summary(json: bool, folder: &Path, done: &[Done], table: Option<&Path>, clock
         count - ran,
         failed.len()
     ));
+    text.insert_str(0, &found);
     if let Some(table) = table {
         text.push_str(&format!("summary: {} (.csv, .parquet), trends.csv\n", shown(table)));
     }
     Ok(text)
+}
+
+/// Most rows of the table that is printed: as many as most windows have.
+const ROWS: usize = 50;
+
+/// What was found, where it fits into a window.
+fn table_of(done: &[Done]) -> String {
+    let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
+    let table = summary::shown(&entries);
+    if !(1..=ROWS).contains(&table.rows()) || table.columns.len() < 2 {
+        return String::new();
+    }
+    artifact_text(&Artifact::Table(table.into()))
 }

@@ -17,7 +17,7 @@ pub fn run(results: &[PathBuf], json: bool) -> Result<(), Failure> {
 }
 
 /// The modes of the last stage that lists any, and the verdict of the last one that has one.
-fn of(path: &Path) -> Result<Compared, Failure> {
+pub fn of(path: &Path) -> Result<Compared, Failure> {
     require_result(path)?;
     let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let mut found = Compared { name: path.display().to_string(), verdict: None, modes: Vec::new() };

@@ -68,10 +68,10 @@ pub fn say_of_result(path: &Path, other: &Path) -> Result<String, String> {
         said += &tree_text(&file, stage, &finder);
     }
     let run = read_result(path).map_err(|error| error.to_string())?;
-    said += &report(&run, &|_| String::new()).map_err(|error| error.to_string())?;
+    said += &report(&run, &|_| String::new(), None).map_err(|error| error.to_string())?;
     said.extend(figures(&run).into_iter().map(|(_, text)| text));
     let other = ResultFile::open(other).map_err(|error| error.to_string())?;
-    said += &diff_text(&Diff::of(&file, &other).map_err(|error| error.to_string())?);
+    said += &diff_text(&Diff::of(&file, &other).map_err(|error| error.to_string())?, true);
     Ok(said)
 }
 

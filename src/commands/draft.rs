@@ -6,7 +6,7 @@ use afmid_pipeline::recording::is_of_resampling;
 use afmid_pipeline::{Plan, Registry};
 
 use super::load::plan_text;
-use super::target::require_folder;
+use super::target::provide_folder;
 use crate::cli::{Goal, RecordingsArgs};
 use crate::failure::Failure;
 use crate::relative::folder_of;
@@ -62,7 +62,7 @@ impl Draft {
         choice.notes.extend(notes);
         choice.notes.extend(source.remarks.iter().filter(|remark| is_of_resampling(remark)).cloned());
         let path = path(choice.name())?;
-        require_folder(folder_of(&path))?;
+        provide_folder(folder_of(&path))?;
         choice.notes.extend(left_out(&source, args, goal, &path));
         let text = pipeline(&source, &choice, wanted, folder_of(&path)).map_err(usage)?;
         let plan = plan_text(&path.display().to_string(), &text, &[], registry)?;

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::load::load;
 use super::sweep::refuse;
-use super::target::require_folder;
+use super::target::provide_folder;
 use crate::cli::{ExamArgs, ExamKind};
 use crate::failure::Failure;
 use crate::interrupt::{self, Silent};
@@ -47,7 +47,7 @@ fn score(args: &ExamArgs, stages: &dyn Stages) -> Result<Score, Failure> {
             return Err(Failure::usage(format!("the config has no stage `{id}`"), Some(help.to_owned())));
         }
     }
-    args.keep.as_deref().map_or(Ok(()), |folder| require_folder(folder_of(folder)))?;
+    args.keep.as_deref().map_or(Ok(()), |folder| provide_folder(folder_of(folder)))?;
     sweep_folders();
     let folder = temporary_folder("exam")
         .map_err(|error| Failure::failed(format!("no temporary folder can be made: {error}"), None))?;

@@ -10,7 +10,7 @@ use afmid_pipeline::files::{FilledFolder, LIST, is_temporary, open_regular, swee
 use serde_json::{Value, json};
 
 use super::diff::open;
-use super::target::{make_folder, require_folder, text_of};
+use super::target::{make_folder, provide_folder, text_of};
 use crate::cli::CrateArgs;
 use crate::failure::Failure;
 use crate::output::print;
@@ -104,8 +104,8 @@ fn require_crate(folder: &Path) -> Result<(), Failure> {
             Some("give another place with -o".to_owned()),
         )),
         Ok(_) => Ok(()),
-        Err(error) if error.kind() == ErrorKind::NotFound => require_folder(folder_of(folder)),
-        Err(_) => require_folder(folder),
+        Err(error) if error.kind() == ErrorKind::NotFound => provide_folder(folder_of(folder)),
+        Err(_) => provide_folder(folder),
     }
 }
 

@@ -44,7 +44,7 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
         1 => ", and a warning".to_owned(),
         count => format!(", and {count} warnings"),
     };
-    let next = format!("all numbers{more}: afmid show {} {last}", path_word(&answered.files.result));
+    let next = format!("all numbers{more}: afmid show {} {last} --all", path_word(&answered.files.result));
     let nonlinear = moves(found).then(|| {
         format!("a mode that moves is not linear; what by: afmid diagnose {}", words(&args.at_once.recordings))
     });

@@ -6,7 +6,7 @@ use afmid_pipeline::Registry;
 use serde_json::json;
 
 use super::draft::{Draft, is_free};
-use super::target::require_folder;
+use super::target::provide_folder;
 use crate::cli::{New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::{print, say};
@@ -92,7 +92,7 @@ fn begun(name: &str, place: &NewFolderArgs, is_crate: bool) -> Result<Option<Pat
         let help = "choose another folder with -o, or remove it".to_owned();
         return Err(Failure::usage(format!("{} is there already", folder.display()), Some(help)));
     }
-    require_folder(folder_of(&folder))?;
+    provide_folder(folder_of(&folder))?;
     let Some(sources) = place.sources.as_ref().filter(|_| is_crate) else { return Ok(None) };
     let clone = sources.join("pipeline/Cargo.toml").is_file().then(|| std::path::absolute(sources).ok()).flatten();
     let help = "give the folder of a clone of afmid's repository".to_owned();

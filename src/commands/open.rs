@@ -1,13 +1,21 @@
 //! From a result file's name to the file.
 
 use std::io::ErrorKind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use afmid_pipeline::files::open_regular;
 use afmid_pipeline::recording::recognised;
 use afmid_pipeline::store::{FileKind, file_kind};
 
+use crate::batch::summary::SUMMARY;
 use crate::failure::Failure;
+
+/// The file that stands for a folder of results: what a batch, or a run of a sweep, sums up in. The path itself of any
+/// other.
+pub fn summary_of(path: &Path) -> PathBuf {
+    let summary = path.join(SUMMARY);
+    if path.is_dir() && summary.is_file() { summary } else { path.to_owned() }
+}
 
 /// Sees to it that a path names a file of afmid's, whole or not. Errors, all usage: there is none; what it is instead,
 /// and what to do.

@@ -9,7 +9,7 @@ use afmid_pipeline::files::{FilledFolder, replace_with};
 use afmid_pipeline::store::read_result;
 use serde_json::json;
 
-use super::open::require_result;
+use super::open::{require_result, summary_of};
 use super::target::{Target, make_folder, prepare, text_of};
 use crate::cli::ReportArgs;
 use crate::failure::Failure;
@@ -21,11 +21,14 @@ use crate::show::pretty;
 
 /// Writes the page, and the figures if asked for, and says where.
 pub fn run(args: &ReportArgs) -> Result<(), Failure> {
-    require_result(&args.result)?;
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.result));
-    prepare(&output, Target::Page, &[("the result file", args.result.clone())])?;
+    let result = summary_of(&args.result);
+    require_result(&result)?;
+    // beside the results of a folder, to which it leads
+    let own = if result == args.result { default_output(&result) } else { result.with_extension("html") };
+    let output = args.output.clone().unwrap_or(own);
+    prepare(&output, Target::Page, &[("the result file", result.clone())])?;
     args.figures.as_deref().map_or(Ok(()), make_folder)?;
-    let (run, page) = drawn_page(&args.result, &output)?;
+    let (run, page) = drawn_page(&result, &output, args.title.as_deref())?;
     let drawn = args.figures.as_ref().map(|folder| Figures::new(folder, &run, args.png)).transpose()?;
     replace_with(&output, |temporary| fs::write(temporary, page.as_bytes())).map_err(|error| failed(&error))?;
     let written = drawn.map(|drawn| drawn.write()).transpose()?.unwrap_or_default();
@@ -39,16 +42,17 @@ pub fn run(args: &ReportArgs) -> Result<(), Failure> {
 
 /// Writes the page of a result, and returns what it is of. Errors: a damaged result; it cannot be written.
 pub fn write_page(result: &Path, output: &Path) -> Result<RunResult, Failure> {
-    let (run, page) = drawn_page(result, output)?;
+    let (run, page) = drawn_page(result, output, None)?;
     replace_with(output, |temporary| fs::write(temporary, page.as_bytes())).map_err(|error| failed(&error))?;
     Ok(run)
 }
 
 /// A result and its page. Errors: it is damaged.
-fn drawn_page(result: &Path, output: &Path) -> Result<(RunResult, String), Failure> {
+fn drawn_page(result: &Path, output: &Path, title: Option<&str>) -> Result<(RunResult, String), Failure> {
     let run = read_result(result).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let (results, page) = (folder_of(result), folder_of(output));
-    let page = report(&run, &|name| beside(results, page, name)).map_err(|error| Failure::failed(error, None))?;
+    let page =
+        report(&run, &|name| beside(results, page, name), title).map_err(|error| Failure::failed(error, None))?;
     Ok((run, page))
 }
 

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::load::load;
 use super::sweep;
 use super::target::{Input, Target, prepare};
-use crate::batch::dataset::records_in;
+use crate::batch::dataset::{Replaced, all_absolute};
 use crate::cli::RunArgs;
 use crate::failure::{Failure, Message};
 use crate::interrupt;
@@ -31,13 +31,17 @@ pub const PROGRAM: &str = concat!("afmid ", env!("CARGO_PKG_VERSION"));
 pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     let mut set = args.config.set.clone();
     if !args.files.is_empty() {
-        set.push(records_in(&args.files).map_err(|problem| Failure::usage(problem, None))?);
+        // a config that names none, or such as are not there, still says which stage reads them
+        let replaced = load(&args.config.config, &set, stages).ok().and_then(|plan| Replaced::of(&plan));
+        let argument =
+            all_absolute(&args.files).and_then(|files| replaced.unwrap_or(Replaced::Records).argument(&files));
+        set.push(argument.map_err(|problem| Failure::usage(problem, None))?);
     }
     let plan = load(&args.config.config, &set, stages)?;
     if let Some(count) = plan.points() {
         return sweep::run(&plan, count, args);
     }
-    let output = args.output.clone().unwrap_or_else(|| default_output(plan.name()));
+    let output = args.output.clone().unwrap_or_else(|| default_output(&stem_of(&args.config.config)));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref());
     let computation = Computation {
@@ -237,6 +241,16 @@ pub fn default_output(name: &str) -> PathBuf {
     // a name that begins with a dash would be an option where it is typed again
     let name = name.trim_start_matches(['.', '-']);
     PathBuf::from(format!("{}.h5", if name.is_empty() { "result" } else { name }))
+}
+
+/// The folder of several results of a config, in the working directory.
+pub fn default_folder(config: &Path) -> PathBuf {
+    default_output(&stem_of(config)).with_extension("")
+}
+
+/// A config's file name without its ending.
+fn stem_of(config: &Path) -> String {
+    config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }
 
 /// What a run reads: its config and the files of its stages.

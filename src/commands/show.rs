@@ -2,19 +2,22 @@
 
 use std::path::Path;
 
-use afmid_pipeline::Artifact;
 use afmid_pipeline::config::nearest;
 use afmid_pipeline::store::{PortSummary, ResultFile, StageSummary};
+use afmid_pipeline::{Artifact, Shape};
 
-use super::open::require_result;
+use super::open::{require_result, summary_of};
 use crate::batch::shell::quoted;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::printable::one_line;
-use crate::show::{artifact_json, artifact_text, overview_json, overview_text, pretty, stage_head, stage_json};
+use crate::show::{
+    artifact_json, artifact_text, csv_text, overview_json, overview_text, pretty, stage_head, stage_json,
+};
 
 /// Shows a result file, one of its stages, or one artifact of a stage, as text or as JSON.
-pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
+pub fn run(path: &Path, id: Option<&str>, all: bool, json: bool) -> Result<(), Failure> {
+    let path = &summary_of(path);
     require_result(path)?;
     let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
     let text = match (id, json) {
@@ -23,10 +26,43 @@ pub fn run(path: &Path, id: Option<&str>, json: bool) -> Result<(), Failure> {
         (Some(id), json) => match port(&file, id) {
             Some((stage, name)) => port_text(&file, find(&file, stage)?, name, json)?,
             None if json => pretty(&stage_json(&file, find(&file, id)?)?)?,
-            None => stage_text(&file, find(&file, id)?)?,
+            None if all => stage_text(&file, find(&file, id)?)?,
+            None => first_text(&file, find(&file, id)?)?,
         },
     };
     print(&text)
+}
+
+/// Prints a stage's table, that of its modes or else its first, or the one that is named, as comma-separated values.
+/// Errors, usage: there is none.
+pub fn table(path: &Path, id: &str) -> Result<(), Failure> {
+    let path = &summary_of(path);
+    require_result(path)?;
+    let file = ResultFile::open(path).map_err(|error| Failure::failed(&error, error.help.clone()))?;
+    let (stage, named) = match port(&file, id) {
+        Some((stage, name)) => (find(&file, stage)?, Some(name)),
+        None => (find(&file, id)?, None),
+    };
+    let tables: Vec<&str> =
+        stage.ports.iter().filter(|port| port.shape == Shape::Table).map(|port| &port.name[..]).collect();
+    let chosen = match named {
+        Some(name) => tables.iter().find(|own| **own == name),
+        None => tables.iter().find(|own| **own == "modes").or(tables.first()),
+    };
+    let id = &stage.record.id;
+    let Some(chosen) = chosen else {
+        let wanted = named.map_or_else(String::new, |name| format!(" `{}`", one_line(name)));
+        let names: Vec<String> = tables.iter().map(|own| format!("{id}.{own}")).collect();
+        let help = match names.is_empty() {
+            true => "`--json` prints whatever a stage has".to_owned(),
+            false => format!("there is: {}", names.join(", ")),
+        };
+        return Err(Failure::usage(format!("`{}` has no table{wanted}", one_line(id)), Some(help)));
+    };
+    match artifact(&file, id, chosen)? {
+        Artifact::Table(table) => print(&csv_text(&table).map_err(|error| Failure::failed(error, None))?),
+        other => Err(Failure::failed(format!("{id}.{chosen} is {}, wanted a table", other.shape().name()), None)),
+    }
 }
 
 /// The tables of modes that are no longer than a window, each under its name. Errors: one is damaged.
@@ -97,6 +133,24 @@ fn artifact(file: &ResultFile, id: &str, port: &str) -> Result<Artifact, Failure
 
 /// Rows of a table that a stage shows among its other artifacts: as many as most windows do. A longer one is shown alone.
 const ROWS: usize = 50;
+
+/// The table of a stage's modes, and how to see what else it has; all of a stage without one. Errors: as of
+/// [`stage_text`].
+fn first_text(file: &ResultFile, stage: &StageSummary) -> Result<String, Failure> {
+    let id = &stage.record.id;
+    let Some(port) = stage.ports.iter().find(|port| port.name == "modes") else { return stage_text(file, stage) };
+    let others: Vec<&str> = stage.ports.iter().map(|port| &port.name[..]).filter(|name| *name != "modes").collect();
+    let table = match artifact(file, id, &port.name)? {
+        Artifact::Table(table) if table.rows() > ROWS => elsewhere(file, id, port, table.rows()),
+        table => artifact_text(&table),
+    };
+    let mut text = stage_head(&stage.record) + "\n" + &titled(&port.name, port, &table);
+    if !others.is_empty() {
+        let names = one_line(&others.join(", "));
+        text += &format!("\n{names}: afmid show {} {} --all\n", quoted(file.path()), one_line(id));
+    }
+    Ok(text)
+}
 
 /// A stage with all its artifacts, first what is read: tables, documents, then what is shown by its ranges, long tables
 /// by their number of rows. Errors: one is damaged.

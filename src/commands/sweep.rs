@@ -7,7 +7,7 @@ use afmid_pipeline::{Artifact, Plan};
 use serde_json::{Value, json};
 
 use super::batch::ledger;
-use super::run::{PROGRAM, default_output, open_cache, warn, written_folders};
+use super::run::{PROGRAM, default_folder, open_cache, warn, written_folders};
 use crate::batch::ledger::{Entry, Ledger};
 use crate::batch::summary::{SWEEP, Tables, Title};
 use crate::batch::work::{Done, Work, all};
@@ -25,7 +25,7 @@ use crate::sweep::table::{shown, table};
 /// stops no other; then the exit code is 3.
 pub fn run(plan: &Plan, count: usize, args: &RunArgs) -> Result<(), Failure> {
     let clock = Instant::now();
-    let folder = folder(plan, args)?;
+    let folder = folder(args)?;
     let ledger = ledger(&folder)?;
     let tables = Tables::open(&folder, SWEEP)?;
     let points = computed(plan, count, args, &ledger)?;
@@ -53,8 +53,8 @@ pub fn refuse(plan: &Plan, why: &str) -> Result<(), Failure> {
 }
 
 /// The folder of the results. Errors, usage: `-o` names a result file.
-fn folder(plan: &Plan, args: &RunArgs) -> Result<PathBuf, Failure> {
-    let Some(output) = &args.output else { return Ok(default_output(plan.name()).with_extension("")) };
+fn folder(args: &RunArgs) -> Result<PathBuf, Failure> {
+    let Some(output) = &args.output else { return Ok(default_folder(&args.config.config)) };
     if output.extension().is_some_and(|extension| extension == "h5") {
         let message = format!("{} is one file, and the config has a [sweep]: wanted a folder", output.display());
         let help = format!("every point has a result file in it: `-o {}`", output.with_extension("").display());

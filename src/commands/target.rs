@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::files::{has_mark, open_regular, probe, read_regular, states_mark, sweep_beside};
 use afmid_pipeline::store::{FileKind, Written, file_kind, written};
 
-use crate::batch::shell::quoted;
 use crate::export::is_exported;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -77,8 +76,8 @@ pub type Input = (&'static str, PathBuf);
 /// Sees to it, before anything runs, that `path` can be written and that nothing is lost by it. Removes what killed
 /// commands left beside it.
 ///
-/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder is not
-/// there or cannot be written.
+/// Errors, all usage: it is an input; it exists and is no regular file, or a file of another kind; its folder cannot be
+/// made or written.
 pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Failure> {
     let shown = path.display();
     match fs::metadata(path) {
@@ -97,7 +96,7 @@ pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Fail
     if path.file_name().is_none() {
         return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
     }
-    require_folder(folder_of(path))?;
+    provide_folder(folder_of(path))?;
     interrupt::writes_in(folder_of(path));
     sweep_beside(path);
     probe(path).map_err(|error| match error.kind() {
@@ -182,11 +181,11 @@ fn odd(metadata: &Metadata) -> &'static str {
     }
 }
 
-/// Sees to it that a file can be made in a folder as far as the folder goes: one that is missing is most likely a
-/// misspelt path.
+/// Sees to it that a file can be made in a folder as far as the folder goes: one that is missing is made, with those above
+/// it.
 ///
-/// Errors, usage: it is not there, or no folder.
-pub fn require_folder(folder: &Path) -> Result<(), Failure> {
+/// Errors, usage: it cannot be made, or is no folder.
+pub fn provide_folder(folder: &Path) -> Result<(), Failure> {
     if folder.is_dir() {
         return Ok(());
     }
@@ -199,26 +198,15 @@ pub fn require_folder(folder: &Path) -> Result<(), Failure> {
         Err(error) if error.kind() != ErrorKind::NotFound => {
             usage(format!("the folder {shown} cannot be looked at: {error}"), ANOTHER)
         }
-        Err(_) => {
-            let help = format!("make it first (mkdir -p {}), or {ANOTHER}", quoted(folder));
-            usage(format!("the folder {shown} does not exist"), &help)
-        }
+        Err(_) => match fs::create_dir_all(folder) {
+            Ok(()) => return Ok(()),
+            Err(error) => usage(format!("the folder {shown} cannot be made: {error}"), ANOTHER),
+        },
     })
 }
 
-/// A folder that a command fills (the results of a batch, figures), made if only that is missing. Errors, usage: the
-/// folder above it is not there; it cannot be made; it is a file.
+/// A folder that a command fills (the results of a batch, figures). Errors as of [`provide_folder`].
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     interrupt::writes_in(folder);
-    if folder.is_dir() {
-        return Ok(());
-    }
-    require_folder(folder_of(folder))?;
-    match fs::create_dir(folder) {
-        Ok(()) => Ok(()),
-        // another process was faster
-        Err(_) if folder.is_dir() => Ok(()),
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => require_folder(folder),
-        Err(error) => Err(usage(format!("the folder {} cannot be made: {error}", folder.display()), ANOTHER)),
-    }
+    provide_folder(folder)
 }

@@ -3,17 +3,21 @@
 use serde_json::Value;
 
 use super::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
+use crate::batch::shell::quoted;
 use crate::printable::one_line;
 use crate::show::{grid, number};
 
 /// Datasets that are listed for one stage; `--json` has all.
 const MOST: usize = 40;
 
+/// Names of files that are listed in a row.
+const NAMES: usize = 5;
+
 /// Lines of configs and warnings that are listed for each side; `--json` has all.
 const MOST_LINES: usize = 200;
 
-/// Differences as text, the first file on the left.
-pub fn diff_text(diff: &Diff) -> String {
+/// Differences as text, the first file on the left; `all`: with every dataset and the hashes of files.
+pub fn diff_text(diff: &Diff, all: bool) -> String {
     let (a, b) = (one_line(&diff.a), one_line(&diff.b));
     if diff.equal {
         return format!("{a} and {b} are equal\n");
@@ -24,21 +28,33 @@ pub fn diff_text(diff: &Diff) -> String {
     lines("config", &diff.config, &mut text);
     diff.stages_only_in_a.iter().for_each(|id| text.push_str(&format!("stage {}: only in {a}\n", one_line(id))));
     diff.stages_only_in_b.iter().for_each(|id| text.push_str(&format!("stage {}: only in {b}\n", one_line(id))));
-    diff.stages.iter().for_each(|stage| stage_text(stage, &mut text));
+    diff.stages.iter().for_each(|stage| stage_text(stage, all, &mut text));
     for other in &diff.other {
         text.push_str(&format!("{}: {}\n", one_line(&other.place), one_line(&other.what)));
+    }
+    let is_short = |stage: &StageDiff| stage.results.iter().all(|result| result.place_only);
+    if !all && !diff.stages.iter().all(is_short) {
+        text.push_str(&format!(
+            "every dataset, by how much: afmid diff {} {} --all\n",
+            quoted(&diff.a),
+            quoted(&diff.b)
+        ));
     }
     text
 }
 
-fn stage_text(stage: &StageDiff, text: &mut String) {
+fn stage_text(stage: &StageDiff, all: bool, text: &mut String) {
     text.push_str(&format!("stage {}\n", one_line(&stage.id)));
     pairs(&stage.stage, "  ", text);
     pairs(&stage.parameters, "  parameter ", text);
     pairs(&stage.inputs, "  input ", text);
-    files(&stage.files, text);
+    files(&stage.files, all, text);
     lines("  warnings", &stage.warnings, text);
     let results: Vec<&ResultDiff> = stage.results.iter().filter(|result| !result.place_only).collect();
+    if !all {
+        counted(&results, text);
+        return;
+    }
     if !results.is_empty() {
         for line in results_text(&results).lines() {
             text.push_str(&format!("  {line}\n"));
@@ -46,6 +62,21 @@ fn stage_text(stage: &StageDiff, text: &mut String) {
     }
     if results.len() > MOST {
         text.push_str(&format!("  ... {} more: see --json\n", results.len() - MOST));
+    }
+}
+
+/// How many datasets of each output differ.
+fn counted(results: &[&ResultDiff], text: &mut String) {
+    let mut outputs: Vec<(&str, usize)> = Vec::new();
+    for result in results {
+        match outputs.iter_mut().find(|(output, _)| *output == result.output) {
+            Some((_, count)) => *count += 1,
+            None => outputs.push((&result.output, 1)),
+        }
+    }
+    for (output, count) in outputs {
+        let datasets = if count == 1 { "a dataset differs".to_owned() } else { format!("{count} datasets differ") };
+        text.push_str(&format!("  {}: {datasets}\n", one_line(output)));
     }
 }
 
@@ -73,10 +104,14 @@ fn lines(head: &str, lines: &Lines, text: &mut String) {
     }
 }
 
-fn files(files: &Files, text: &mut String) {
+fn files(files: &Files, all: bool, text: &mut String) {
     files.only_in_a.iter().for_each(|name| text.push_str(&format!("  - file {}\n", one_line(name))));
     files.only_in_b.iter().for_each(|name| text.push_str(&format!("  + file {}\n", one_line(name))));
-    for pair in &files.other_bytes {
+    if !all && !files.other_bytes.is_empty() {
+        let names: Vec<&str> = files.other_bytes.iter().map(|pair| &pair.name[..]).collect();
+        text.push_str(&format!("  other bytes: {}\n", one_line(&few_names(&names))));
+    }
+    for pair in files.other_bytes.iter().filter(|_| all) {
         let short = |value: &Value| value.as_str().unwrap_or_default().chars().take(16).collect::<String>();
         let (name, a, b) = (one_line(&pair.name), short(&pair.a), short(&pair.b));
         text.push_str(&format!("  file {name}: other bytes, {a} | {b}\n"));
@@ -88,6 +123,14 @@ fn files(files: &Files, text: &mut String) {
     }
     if files.reordered {
         text.push_str("  the same files in another order\n");
+    }
+}
+
+/// Names in a row, the first of many.
+fn few_names(names: &[&str]) -> String {
+    match names.len().checked_sub(NAMES) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..NAMES].join(", ")),
     }
 }
 

@@ -62,8 +62,8 @@ struct Page<'a> {
 
 /// One self-contained HTML page about a run.
 ///
-/// `link` gives the addresses of the results of a batch's data sets.
-pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportError> {
+/// `link` gives the addresses of the results of a batch's data sets. `own`: a title of the reader's own.
+pub(crate) fn report(run: &RunResult, link: &Link<'_>, own: Option<&str>) -> Result<String, ReportError> {
     let mut room = SECTION_FIGURES;
     let sections: Vec<Section> = sections(run, link).map(|drawn| section(drawn, &mut room)).collect();
     let (shown, skipped): (Vec<Section>, Vec<Section>) =
@@ -79,7 +79,7 @@ pub(crate) fn report(run: &RunResult, link: &Link<'_>) -> Result<String, ReportE
     environment.add_template("report.html", include_str!("template.html"))?;
     let page = Page {
         name: &run.name,
-        title: title(run),
+        title: own.map_or_else(|| title(run), |own| printable(own).into_owned()),
         program: &run.program,
         facts: facts(run),
         tiles: tiles(run),

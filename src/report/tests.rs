@@ -10,7 +10,7 @@ use super::{figures, report};
 
 /// The page of a run beside nothing.
 pub(in crate::report) fn alone(run: &RunResult) -> Result<String, ReportError> {
-    report(run, &|_| String::new())
+    report(run, &|_| String::new(), None)
 }
 
 pub(in crate::report) fn bare(stages: Vec<afmid_pipeline::StageRecord>) -> RunResult {

@@ -55,21 +55,14 @@ pub fn shown(points: &[Point]) -> Table {
     let mut keep = |index: usize, column: &Column| {
         let named = OF_MODES.contains(&column.name.as_str()) && (modes || column.name == "verdict");
         let number = !modes && column.name.contains('.') && differs(&column.values) && left > 0;
-        let keep = index <= swept || named && known(&column.values) || column.name == "status" && failed || number;
+        let keep =
+            index <= swept || named && summary::is_known(&column.values) || column.name == "status" && failed || number;
         left -= usize::from(keep && index > swept && number);
         keep
     };
     let columns = table.columns.into_iter().enumerate();
     let columns = columns.filter_map(|(index, column)| keep(index, &column).then_some(column)).collect();
     Table { columns, ..Table::default() }
-}
-
-fn known(values: &ColumnValues) -> bool {
-    match values {
-        ColumnValues::Real(values) => values.iter().any(|value| value.is_finite()),
-        ColumnValues::Text(values) => values.iter().any(|value| !value.is_empty()),
-        _ => true,
-    }
 }
 
 fn differs(values: &ColumnValues) -> bool {

@@ -137,7 +137,7 @@ fn what_is_wrong_is_reported_before_anything_runs() {
     for (arguments, words) in [
         (&["census.toml"][..], &["no data sets"][..]),
         (&["census.toml", "a", "deep/a"], &["two data sets", "`a`"]),
-        (&["census.toml", "nowhere", "census.toml"], &["nowhere is not there", "census.toml is a file"]),
+        (&["census.toml", "nowhere", "census.toml"], &["nowhere is not there", "census.toml is a config"]),
         (&["census.toml", "--manifest", "m.jsonl"], &["m.jsonl:1", "did you mean `files`", "m.jsonl:2"]),
         (&["census.toml", "a", "--shard", "4/3"], &["4/3"]),
         (&["census.toml", "a", "--set", "census.nonsense=1"], &["nonsense"]),

@@ -22,6 +22,7 @@ mod python_reader;
 mod readers;
 mod registry;
 mod report;
+mod results;
 mod submit;
 mod sweep;
 mod threads;

@@ -12,7 +12,7 @@ use serde_json::Value;
 const RATE_HZ: f64 = 1000.0;
 
 /// Times in seconds and one more column.
-fn table(here: &Path, name: &str, title: &str, values: &[f64]) {
+pub fn table(here: &Path, name: &str, title: &str, values: &[f64]) {
     let mut text = format!("Time (s),{title}\n");
     for (k, value) in values.iter().enumerate() {
         let _ = writeln!(text, "{:.3},{value:.9}", k as f64 / RATE_HZ);
@@ -22,7 +22,7 @@ fn table(here: &Path, name: &str, title: &str, values: &[f64]) {
 
 /// Quiet, then two modes that die away, of 40 and 110 Hz by the distance of their poles from zero, in white noise of a
 /// thousandth.
-fn two_modes(seed: u64) -> Vec<f64> {
+pub fn two_modes(seed: u64) -> Vec<f64> {
     let mode = |f: f64, q: f64, t: f64| {
         let rate = 0.5 * TAU * f / q;
         (-rate * t).exp() * ((TAU * f * TAU * f - rate * rate).sqrt() * t).sin()
@@ -66,7 +66,10 @@ fn modes_of_a_recording_are_one_command() {
         assert!(mode == number && (frequency - truth).abs() < 1e-3 * truth, "{stdout}");
         assert!(quality.contains('(') && damping.contains('('), "{stdout}");
     }
-    assert!(lines[4].starts_with("all numbers") && lines[4].ends_with("afmid show hit-3.modes.h5 modes"), "{stdout}");
+    assert!(
+        lines[4].starts_with("all numbers") && lines[4].ends_with("afmid show hit-3.modes.h5 modes --all"),
+        "{stdout}"
+    );
     let names = ["toml", "h5", "html"].map(|ending| format!("hit-3.modes.{ending}"));
     assert_eq!(lines[lines.len() - 3..], names);
     names.iter().for_each(|name| assert!(here.join(name).is_file(), "{name}"));
@@ -109,7 +112,7 @@ fn a_mode_that_moves_leads_on_to_the_diagnosis() {
     // a name that begins with a dash is an option where it is typed
     std::fs::rename(here.join("moving.csv"), here.join("-moving.csv")).expect("a recording");
     let [stdout, _] = said(here, &["modes", "--cache", "cache", "--", "-moving.csv"]);
-    assert!(stdout.contains("afmid show moving.modes.h5 modes\n"), "{stdout}");
+    assert!(stdout.contains("afmid show moving.modes.h5 modes --all\n"), "{stdout}");
     assert!(stdout.contains("what by: afmid diagnose ./-moving.csv\n"), "{stdout}");
 }
 

@@ -203,7 +203,10 @@ fn diff_tells_parameters_files_and_results_apart() {
     let noise = noise.unwrap_or_else(|| panic!("the noise differs: {results:?}"));
     assert!(noise["largest"].as_f64().is_some_and(|largest| largest > 0.0), "{noise}");
     let text = afmid(here, &["diff", "a.h5", "files.h5"]);
-    assert!(text.contains("- file record_3.h5") && text.contains("file record_2.h5: other bytes"), "{text}");
+    assert!(text.contains("- file record_3.h5") && text.contains("other bytes: record_2.h5"), "{text}");
+    assert!(text.contains("afmid diff a.h5 files.h5 --all") && !text.contains("largest"), "{text}");
+    let text = afmid(here, &["diff", "a.h5", "files.h5", "--all"]);
+    assert!(text.contains("file record_2.h5: other bytes") && text.contains("largest"), "{text}");
 
     fs::rename(here.join("data"), here.join("moved")).expect("a move");
     afmid(here, &["run", "count.toml", "--cache", "cache", "-o", "moved.h5", "--set", "records.files=['moved/*.h5']"]);

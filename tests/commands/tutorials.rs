@@ -65,8 +65,8 @@ fn assert_promised(line: &str, stdout: &str) {
     let promised = match line {
         "afmid show results/diagnosis.h5 diagnosis --json" => ["\"named\"", "quadratic-detector"],
         "afmid show results/without.h5 diagnosis" => ["unexplained", "nearest"],
-        "afmid show results/paper.h5 modes" | "afmid show results/mine.h5 modes" => ["frequency_hz", "fit_percent"],
-        "afmid show results/hit.h5 modes" => ["damping_ratio", "shape"],
+        "afmid show results/paper.h5 modes" | "afmid show results/mine.h5 modes" => ["frequency_hz", "static_share"],
+        "afmid show results/hit.h5 modes" => ["damping_ratio", "shapes"],
         "afmid show results/end-noise.h5 end_noise" => ["rms", "samples"],
         _ => return,
     };

@@ -89,9 +89,9 @@ fn a_cache_that_is_a_file_warns_once_and_the_run_goes_on() {
     assert_warned_once(&batch, "cache");
 }
 
-/// `-o` into a folder that is not there makes none, whatever the command.
+/// `-o` into what is no folder is refused before anything runs, whatever the command.
 #[test]
-fn no_command_makes_the_folder_of_its_output() {
+fn no_command_takes_a_file_for_the_folder_of_its_output() {
     let place = census();
     assert!(place.command(&RUN).output().expect("afmid starts").status.success());
     std::fs::write(
@@ -99,6 +99,7 @@ fn no_command_makes_the_folder_of_its_output() {
         format!("{}\n[sweep]\ncensus.min_bandwidth_share = [0.01]\n", sets::CENSUS),
     )
     .expect("a config");
+    std::fs::write(place.path("no"), "a file").expect("a file");
     let before = below(place.folder());
     for arguments in [
         &["run", "census.toml", "-o", "no/out.h5"][..],
@@ -117,7 +118,8 @@ fn no_command_makes_the_folder_of_its_output() {
         let message = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(
-            message.contains("the folder no does not exist") && message.contains("mkdir -p no"),
+            (message.contains("no is a file, wanted a folder") || message.contains("cannot be a folder"))
+                && message.contains("give another place with -o"),
             "{arguments:?}: {message}"
         );
         assert!(output.stdout.is_empty(), "{arguments:?} did something");

@@ -126,9 +126,24 @@ fn is_hdf5(head: &[u8]) -> bool {
     [0, 512, 1024, 2048].iter().any(|&at| head.get(at..).is_some_and(|rest| rest.starts_with(SIGNATURE)))
 }
 
+/// What office programs write: archives of XML parts, and what Excel wrote before 2007.
+fn workbook(path: &Path, head: &[u8]) -> Option<&'static str> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    match &ending[..] {
+        "xlsx" | "xlsm" if head.starts_with(b"PK\x03\x04") => Some("a workbook of Excel"),
+        "ods" if head.starts_with(b"PK\x03\x04") => Some("an OpenDocument spreadsheet"),
+        "xls" if head.starts_with(b"\xD0\xCF\x11\xE0") => Some("a workbook of Excel"),
+        _ => None,
+    }
+}
+
 fn unknown(path: &Path, head: &[u8]) -> StageError {
     if head.is_empty() {
         return StageError::new("the file is empty").at(path);
+    }
+    if let Some(kind) = workbook(path, head) {
+        let help = "save the sheet as CSV or as tab-separated text, and give that file";
+        return StageError::new(format!("{kind}: no format of recordings")).at(path).help(help);
     }
     let begins = head.get(..8.min(head.len())).unwrap_or_default().escape_ascii();
     let known: Vec<&str> = formats().iter().map(|known| known.row.title).collect();

@@ -90,7 +90,7 @@ mod tests {
         let mut entries: Vec<Entry> = (2001..2021).map(|year| entry(year, 46_000.0 + f64::from(year - 2001))).collect();
         entries.push(entry(2021, 46_120.0));
         entries.push(Entry::failed("bad", None, "error: records: a/x.h5: cut short <here>".into()));
-        let page = report(&run(&entries), &|name| format!("there/{}.h5", name.len())).expect("a page");
+        let page = report(&run(&entries), &|name| format!("there/{}.h5", name.len()), None).expect("a page");
         assert_page(&page);
         for word in
             ["trend-frequency-1", "trend-quality-factor-1", "cut short &lt;here&gt;", "href=\"there&#x2f;3.h5\""]
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_batch_without_times_says_what_is_missing() {
-        let page = report(&run(&[Entry::failed("a", None, "no".into())]), &|_| String::new()).expect("a page");
+        let page = report(&run(&[Entry::failed("a", None, "no".into())]), &|_| String::new(), None).expect("a page");
         assert_page(&page);
         assert!(page.contains("no data set says when it was recorded") && !page.contains("<a href=\"\""));
     }

@@ -94,7 +94,7 @@ pub(super) fn summary(
     let noise = |noise: &RingdownNoise| {
         json!({
             "white_std": noise.white.sqrt(),
-            "wander_std": noise.wander.iter().map(|part| part.variance).sum::<f64>().sqrt(),
+            "wander_std": noise.wander.iter().fold(0.0, |sum, part| sum + part.variance).sqrt(),
         })
     };
     Document::new(&json!({
