@@ -23,6 +23,10 @@ const COMPANION: std::ops::Range<f64> = 1.7..3.5;
 const HARMONIC: usize = 3;
 const NEAR: f64 = 0.005;
 const ALIKE: std::ops::Range<f64> = 0.7..1.4;
+/// Distance of two frequencies, relative, up to which they may be one mode's of a system that changed, and amplitude over
+/// that of the other up to which a mode does not ring in a hit.
+const CHANGED: f64 = 0.1;
+const SILENT: f64 = 0.05;
 
 impl Findings<'_> {
     /// What the verdict is made from; `named`: causes with a name, `errors`: on what was held out, model by model.
@@ -44,7 +48,13 @@ impl Findings<'_> {
             noise,
             against_clean: self.repeated().into_iter().chain(self.beyond_noise(noise)).collect(),
             unlike_noise: self.unlike_noise(),
-            against_all: self.endless().into_iter().chain(self.follows()).chain(self.companion()).collect(),
+            against_all: self
+                .endless()
+                .into_iter()
+                .chain(self.follows())
+                .chain(self.companion())
+                .chain(self.changed())
+                .collect(),
         }
     }
 
@@ -160,6 +170,40 @@ impl Findings<'_> {
                 fast.frequency_hz,
                 width(fast) / width(slow)
             ))
+        })
+    }
+
+    /// Two modes of free decays of which no hit has both: one of a system that changed between hits, in a sentence; none
+    /// where there are none.
+    fn changed(&self) -> Option<String> {
+        let (last, layout) = (&self.choice.ladder.last()?.fit.model, &self.bench.layout);
+        if self.bench.driven || layout.stretches() < 2 {
+            return None;
+        }
+        let sections = &last.dynamics.sections;
+        let modes: Vec<usize> = (0..sections.len()).filter(|s| sections[*s].kind == Kind::Oscillator).collect();
+        let amplitude = |e: usize, s: usize| {
+            let [deflection, rate] = last.states[e].sections[s];
+            deflection.hypot(rate)
+        };
+        let has = |s: usize, other: usize| -> Vec<usize> {
+            (0..layout.stretches()).filter(|e| amplitude(*e, other) < SILENT * amplitude(*e, s)).collect()
+        };
+        let mut pairs = modes.iter().flat_map(|a| modes.iter().map(move |b| (*a, *b))).filter(|(a, b)| a < b);
+        pairs.find_map(|(a, b)| {
+            let [from, to] = [a, b].map(|s| sections[s].frequency_hz);
+            let (of_a, of_b) = (has(a, b), has(b, a));
+            let apart = !of_a.is_empty() && !of_b.is_empty() && of_a.len() + of_b.len() == layout.stretches();
+            let number = |e: &usize| (self.bench.stretches[*e].record + 1).to_string();
+            let listed = |of: &[usize]| of.iter().map(number).collect::<Vec<String>>().join(", ");
+            ((to / from - 1.0).abs() < CHANGED && apart).then(|| {
+                format!(
+                    "a mode is at {from:.4} Hz in some hits ({}) and at {to:.4} Hz in all others ({}): the system changed \
+                     between them",
+                    listed(&of_a),
+                    listed(&of_b)
+                )
+            })
         })
     }
 

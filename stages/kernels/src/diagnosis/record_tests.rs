@@ -98,6 +98,42 @@ fn hits_that_lost_samples_are_not_clean() {
     }
 }
 
+/// Hits of one mode of 0.03 cycles per sample, its frequency times a factor of each, and of unlike strengths.
+fn hits_of(rng: &mut ChaCha8Rng, factor: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let hit = |number: usize| {
+        let strength = rng.random_range(0.3..1.0);
+        let turn = TAU * 0.03 * factor(number);
+        (0..DECAY).map(|k| strength * (-(k as f64) / 280.0).exp() * (turn * k as f64).sin()).collect()
+    };
+    (0..HITS).map(hit).collect()
+}
+
+#[test]
+fn a_frequency_that_drifts_or_steps_from_hit_to_hit_is_said() {
+    for seed in 0..3 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let drifting = hits_of(&mut rng, |number| 1.0 + 0.002 * number as f64);
+        let found = of_hits(&mut rng, drifting);
+        assert_eq!((found.verdict, names(&found)), (Verdict::Named, vec!["frequency-drift"]), "{seed}: {found:?}");
+        let stepping = hits_of(&mut rng, |number| if number < 2 { 1.0 } else { 1.004 });
+        let found = of_hits(&mut rng, stepping);
+        assert_eq!((found.verdict, names(&found)), (Verdict::Unexplained, Vec::new()), "{seed}: {found:?}");
+        let said = |line: &String| line.contains("(1, 2)") && line.contains("the system changed");
+        assert!(found.evidence.iter().any(said), "{seed}: {:?}", found.evidence);
+    }
+}
+
+#[test]
+fn hits_beyond_the_range_of_their_sensor_are_named() {
+    for seed in 0..3 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut clipped = hits(&mut rng, &[(0.03, 280.0)]);
+        clipped.iter_mut().flatten().for_each(|y| *y = y.clamp(-0.35, 0.35));
+        let found = of_hits(&mut rng, clipped);
+        assert_eq!((found.verdict, names(&found)), (Verdict::Named, vec!["output-saturation"]), "{seed}: {found:?}");
+    }
+}
+
 #[test]
 fn hits_without_a_mode_are_a_verdict() {
     for seed in 0..4 {
