@@ -96,7 +96,7 @@ pub enum Command {
     },
     /// Show what a run found.
     Show {
-        /// The result file.
+        /// The result file, or the folder of a batch.
         result: PathBuf,
         /// The stage, or STAGE.PORT, one of its artifacts; without it, the run as a whole.
         id: Option<String>,
@@ -291,7 +291,7 @@ fn threads(text: &str) -> Result<NonZeroU16, String> {
 /// What to report, and where to.
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// The result file.
+    /// The result file, or the folder of a batch.
     pub result: PathBuf,
     /// The page [default: the result file's name with `.html`, in the working directory].
     #[arg(short, long, value_name = "REPORT.html")]

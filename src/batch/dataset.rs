@@ -86,7 +86,10 @@ impl Replaced {
 /// The one file that is named, or that a folder holds. Errors: there are more, or none.
 fn one(files: &[String]) -> Result<String, String> {
     let [path] = files else {
-        return Err(format!("{} files, and the config reads one: make each a data set", files.len()));
+        return Err(format!(
+            "{} files, and the config reads one: `afmid batch CONFIG FILE...` runs it on each",
+            files.len()
+        ));
     };
     if !Path::new(path).is_dir() {
         return Ok(path.clone());

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::draft::{Draft, is_free};
 use super::target::provide_folder;
+use crate::batch::shell::quoted;
 use crate::cli::{New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs};
 use crate::failure::Failure;
 use crate::output::{print, say};
@@ -43,13 +44,14 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         }))?);
     }
     let files = if draft.recordings == 1 { "1 file".to_owned() } else { format!("{} files", draft.recordings) };
-    let name = output.file_stem().unwrap_or_default().to_string_lossy();
+    let result = quoted(output.with_extension("h5").file_name().unwrap_or_default());
     let why = if draft.why.is_empty() { String::new() } else { format!("; {}", one_line(&draft.why)) };
     // the stage that all others lead to
     let last = draft.plan.nodes.last().map_or("", |node| &node.id);
     print(&format!(
-        "{}: {files}{why}\n  afmid run {0} -o {name}.h5\n  afmid show {name}.h5 {last}\n  afmid report {name}.h5\n",
-        output.display()
+        "{}: {files}{why}\n  afmid run {} -o {result}\n  afmid show {result} {last}\n  afmid report {result}\n",
+        output.display(),
+        quoted(output)
     ))
 }
 

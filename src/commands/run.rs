@@ -8,6 +8,7 @@ use afmid_pipeline::error::StoreError;
 use afmid_pipeline::files::sweep_folders;
 use afmid_pipeline::graph::Stages;
 use afmid_pipeline::runner::{Failed, Observer, Options, RunError, run as run_plan, run_to_file};
+use afmid_pipeline::store::ResultFile;
 use afmid_pipeline::{InputFiles, Plan, RunResult};
 use serde_json::{Value, json};
 
@@ -41,7 +42,7 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
     if let Some(count) = plan.points() {
         return sweep::run(&plan, count, args);
     }
-    let output = args.output.clone().unwrap_or_else(|| default_output(&stem_of(&args.config.config)));
+    let output = args.output.clone().unwrap_or_else(|| default_result(&args.config.config));
     prepare(&output, Target::Result, &inputs(&plan, &args.config.config))?;
     let cache = open_cache(args.cache.as_deref());
     let computation = Computation {
@@ -51,11 +52,23 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
         jobs: args.jobs,
         overrides: &plan.config.overrides,
     };
+    let replaced = replaced(&output, &plan);
     let result = run_and_write(&plan, &output, &computation)?;
+    replaced.iter().for_each(|note| say(&format!("{note}\n")));
     if args.json {
         return print(&pretty(&as_json(&output, &result))?);
     }
     print(&format!("{}: {}\n", shown(&output), summary(&result)))
+}
+
+/// That a result of another config, or of other files, lies where the new one goes; none where nothing is lost by it.
+fn replaced(output: &Path, plan: &Plan) -> Option<String> {
+    let file = ResultFile::open(output).ok()?;
+    let old = file.run();
+    let same = old.config == plan.config_text() && old.overrides == plan.config.overrides;
+    let name = shown(output);
+    (!same)
+        .then(|| format!("{name} was the result of another config or of other files: it is replaced (-o keeps both)"))
 }
 
 /// Runs a plan and writes its result file, with progress on stderr. Errors: those of its stages, a file that cannot be
@@ -245,10 +258,20 @@ pub fn default_output(name: &str) -> PathBuf {
 
 /// The folder of several results of a config, in the working directory.
 pub fn default_folder(config: &Path) -> PathBuf {
-    default_output(&stem_of(config)).with_extension("")
+    in_place(stem_of(config))
 }
 
-/// A config's file name without its ending.
+/// The result of a config, in the working directory.
+fn default_result(config: &Path) -> PathBuf {
+    in_place(stem_of(config) + ".h5")
+}
+
+/// A name in the working directory; one that begins with a dash would be an option where it is typed again.
+fn in_place(name: String) -> PathBuf {
+    if name.starts_with('-') { Path::new(".").join(name) } else { PathBuf::from(name) }
+}
+
+/// A config's file name without its ending, as it is.
 fn stem_of(config: &Path) -> String {
     config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }

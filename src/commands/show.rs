@@ -51,6 +51,11 @@ pub fn table(path: &Path, id: &str) -> Result<(), Failure> {
     };
     let id = &stage.record.id;
     let Some(chosen) = chosen else {
+        let other = named.and_then(|name| stage.ports.iter().find(|port| port.name == name));
+        if let Some(port) = other {
+            let (name, shape) = (one_line(&format!("{id}.{}", port.name)), port.shape.name());
+            return Err(Failure::usage(format!("`{name}` is of shape {shape}, wanted a table"), None));
+        }
         let wanted = named.map_or_else(String::new, |name| format!(" `{}`", one_line(name)));
         let names: Vec<String> = tables.iter().map(|own| format!("{id}.{own}")).collect();
         let help = match names.is_empty() {

@@ -93,7 +93,7 @@ pub fn prepare(path: &Path, target: Target, inputs: &[Input]) -> Result<(), Fail
         }
         Err(_) => {}
     }
-    if path.file_name().is_none() {
+    if path.file_name().is_none() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
         return Err(usage(format!("{shown} is a folder, wanted a file"), ANOTHER));
     }
     provide_folder(folder_of(path))?;

@@ -30,6 +30,16 @@ fn a_run_is_called_as_its_config_and_its_modes_are_shown_alone() {
     let said = afmid(here, &["run", "made/first.v2.toml", "--cache", "cache"]);
     assert!(said.starts_with("first.v2.h5: ") && here.join("first.v2.h5").is_file(), "{said}");
 
+    // of other files: what was there is gone, which is said
+    let arguments = ["run", "made/first.v2.toml", "two", "--cache", "cache"];
+    assert!(
+        crate::common::said(here, &arguments)[1].contains("first.v2.h5 was the result of another config or of other")
+    );
+    let again = crate::common::said(here, &["run", "made/first.v2.toml", "--cache", "cache", "-o", "first.v2.h5"]);
+    assert!(again[1].contains("it is replaced"), "{again:?}");
+    let (code, message) = refused(here, &["run", "made/first.v2.toml", "--cache", "cache", "-o", "none/"]);
+    assert!(code == Some(2) && message.contains("none/ is a folder, wanted a file"), "{message}");
+
     let alone = afmid(here, &["show", "first.v2.h5", "modes"]);
     assert!(alone.contains("modes (table)\nfrequency_hz [Hz]"), "{alone}");
     assert!(!alone.contains("summary (document)") && alone.contains("afmid show first.v2.h5 modes --all"), "{alone}");
@@ -45,7 +55,7 @@ fn a_run_is_called_as_its_config_and_its_modes_are_shown_alone() {
     let hits = afmid(here, &["show", "first.v2.h5", "modes.hits", "--csv"]);
     assert_eq!(hits.lines().count(), 1 + 2 * 2, "a header, two hits of two modes: {hits}");
     for (wrong, said) in [
-        (&["show", "first.v2.h5", "modes.shapes", "--csv"][..], "has no table `shapes`"),
+        (&["show", "first.v2.h5", "modes.shapes", "--csv"][..], "is of shape array, wanted a table"),
         (&["show", "first.v2.h5", "--csv"], "<ID>"),
         (&["show", "first.v2.h5", "modes", "--csv", "--json"], "cannot be used with"),
     ] {

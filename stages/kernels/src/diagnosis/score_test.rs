@@ -108,7 +108,7 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
     let basis = Basis::new(fit);
     let trials: Vec<(&Candidate, Vec<f64>)> = candidates
         .iter()
-        .filter(|candidate| recurs(candidate.cause) || !fit.model.has(candidate.cause, &candidate.modes))
+        .filter(|candidate| may_recur(fit, candidate) || !fit.model.has(candidate.cause, &candidate.modes))
         .flat_map(|candidate| candidate.cause.trials(&scene).into_iter().map(move |trial| (candidate, trial)))
         .filter(|(candidate, trial)| {
             !frequency(candidate.cause, trial).is_some_and(|frequency_hz| is_own(bench, fit, frequency_hz))
@@ -134,6 +134,8 @@ pub(super) fn screen(bench: &Bench, fit: &Fit, candidates: &[Candidate]) -> Vec<
             None => best.push(next),
         }
     }
+    let is_further = |promise: &Promise| fit.model.has(promise.candidate.cause, &promise.candidate.modes);
+    best.retain(|promise| !is_further(promise) || promise.gain > FURTHER * fit.loss);
     let falling = |best: &mut Vec<Promise>| best.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     falling(&mut best);
     for promise in best.iter_mut().take(REFINED) {
@@ -153,10 +155,18 @@ fn frequency(cause: &dyn Cause, values: &[f64]) -> Option<f64> {
     cause.about().parameters.iter().zip(values).find(|(parameter, _)| parameter.unit == "Hz").map(|(_, value)| *value)
 }
 
-/// Whether there may be several of a cause: of what is added to a record at a frequency of its own.
-fn recurs(cause: &dyn Cause) -> bool {
-    let about = cause.about();
-    about.part == Part::Record && about.parameters.iter().any(|parameter| parameter.unit == "Hz")
+/// Lines that a model has at most, and what a further one has to take of the squared residual. Why: hum has some
+/// harmonics, of which the largest is most of what is left; what a curve makes of an input that repeats itself are many
+/// lines, and none of them much of the rest.
+const MOST_LINES: usize = 3;
+const FURTHER: f64 = 0.4;
+
+/// Whether there may be another one of a cause: of what is added to a record at a frequency of its own.
+fn may_recur(fit: &Fit, candidate: &Candidate) -> bool {
+    let about = candidate.cause.about();
+    let own = fit.model.causes.iter().filter(|added| added.is(candidate.cause, &candidate.modes));
+    let is_line = about.part == Part::Record && about.parameters.iter().any(|parameter| parameter.unit == "Hz");
+    is_line && own.count() < MOST_LINES
 }
 
 /// Largest multiple of a mode's frequency that a nonlinear motion still shows.

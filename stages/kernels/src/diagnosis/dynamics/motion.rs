@@ -73,6 +73,8 @@ const MOST_SECTIONS: usize = 32;
 
 /// Sections whose step takes as long as that of a law that is no product of powers: a hyperbolic tangent for each motion.
 const LAW: usize = 8;
+/// Steps of a section that take as long as an effect on a sample that is seen: a cosine of a line, a curve of a sensor.
+const SEEN: usize = 4;
 
 impl Run<'_> {
     fn sections(&self) -> &[Section] {
@@ -83,12 +85,14 @@ impl Run<'_> {
         !self.effects.modal_force.is_empty()
     }
 
-    /// Steps of its sections and of the laws that bend it, those of a motion that forces bend four times.
+    /// Steps of its sections and of the laws that bend it, those of a motion that forces bend four times, and what its
+    /// effects make of the samples that are seen.
     pub fn work(&self) -> u64 {
         let Span { samples, steps, .. } = self.span;
+        let seen = self.effects.optics.len() + self.effects.added.len() + self.effects.lost.len();
         let bent = if self.is_bent() { 4 } else { 1 };
         let laws = self.effects.modal_force.iter().filter(|force| matches!(force, ModalForce::Law(..))).count();
-        (samples * steps * (self.sections().len() + LAW * laws) * bent) as u64
+        (samples * steps * (self.sections().len() + LAW * laws) * bent + SEEN * samples * seen) as u64
     }
 
     /// Modes come first.
