@@ -3,7 +3,6 @@
 use serde_json::Value;
 
 use super::diff::{Diff, Files, Lines, Pair, ResultDiff, StageDiff};
-use crate::batch::shell::quoted;
 use crate::printable::one_line;
 use crate::show::{grid, number};
 
@@ -32,15 +31,12 @@ pub fn diff_text(diff: &Diff, all: bool) -> String {
     for other in &diff.other {
         text.push_str(&format!("{}: {}\n", one_line(&other.place), one_line(&other.what)));
     }
-    let is_short = |stage: &StageDiff| stage.results.iter().all(|result| result.place_only);
-    if !all && !diff.stages.iter().all(is_short) {
-        text.push_str(&format!(
-            "every dataset, by how much: afmid diff {} {} --all\n",
-            quoted(&diff.a),
-            quoted(&diff.b)
-        ));
-    }
     text
+}
+
+/// Whether datasets differ, of which the short text gives the number alone.
+pub fn counts_datasets(diff: &Diff) -> bool {
+    diff.stages.iter().any(|stage| stage.results.iter().any(|result| !result.place_only))
 }
 
 fn stage_text(stage: &StageDiff, all: bool, text: &mut String) {

@@ -121,7 +121,7 @@ fn the_shipped_config_reads_nine_points_of_a_beam() {
 
 /// Modes and shapes come first; the stabilisation diagram is a line with the command that shows it.
 fn shown_in_order(here: &Path) {
-    let text = afmid(here, &["show", "frf.h5", "modes"]);
+    let text = afmid(here, &["show", "frf.h5", "modes", "--all"]);
     let place = |what: &str| text.find(what).unwrap_or_else(|| panic!("no {what}: {text}"));
     assert!(place("\nmodes (table)") < place("\nsummary (document)") && place("shape:") < place("\nfit (array)"));
     assert!(place("\nfit (array)") < place("\ndiagram (table)"), "{text}");
