@@ -11,7 +11,7 @@ fn refused(here: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Three hits in files of their own, in two folders.
+/// Two folders of two hits each, in files of their own.
 fn folders(here: &Path) {
     for (folder, seeds) in [("one", [1, 2]), ("two", [3, 4])] {
         std::fs::create_dir(here.join(folder)).expect("a folder");
