@@ -27,6 +27,8 @@ pub(super) struct UnnamedLaw {
 
 /// Laws that are fitted in the place of all causes.
 const FITTED: usize = 3;
+/// Steps of sections after which no further law is fitted: half of what all searches for causes may take.
+const WORK: u64 = 1_000_000_000;
 
 /// The term of the library that would take most of a fit's residual, of those that are significant; or, where names are
 /// many, one of the largest that alone does better than all of them.
@@ -52,13 +54,12 @@ pub(super) fn unnamed_law(
     let beside = beside_laws(bench, baseline, fit);
     let laws = fit.model.causes.len() - beside.as_ref().unwrap_or(baseline).model.causes.len();
     let before = beside.as_ref().unwrap_or(baseline);
-    if laws > 0 {
-        fit_alone(bench, before, &mut found, candidates);
-    }
-    if laws > 1 {
+    let end = bench.work() + WORK;
+    let beaten = laws > 0 && fit_alone(bench, [before, fit], &mut found, candidates, end);
+    if laws > 1 && !beaten {
         // what several names share is seen whole before any of them came
         let mut first = significant(bench, before, blocks, false_alarm_rate);
-        fit_alone(bench, before, &mut first, candidates);
+        fit_alone(bench, [before, fit], &mut first, candidates, end);
         first.retain(|(law, _)| law.beats(bench, fit));
         found.extend(first);
     }
@@ -79,17 +80,31 @@ pub(super) fn simpler_law(
     let before = beside_laws(bench, simpler, fit);
     let before = before.as_ref().unwrap_or(simpler);
     let mut found = significant(bench, before, blocks, false_alarm_rate);
-    fit_alone(bench, before, &mut found, candidates);
+    fit_alone(bench, [before, fit], &mut found, candidates, bench.work() + WORK);
     found.into_iter().map(|(law, _)| law).find(|law| law.beats(bench, fit))
 }
 
-/// Fits the linear model with each of the largest forces that no candidate is.
-fn fit_alone(bench: &Bench, linear: &Fit, found: &mut [(UnnamedLaw, Option<Candidate>)], candidates: &[Candidate]) {
+/// Fits the linear model with each of the largest forces that no candidate is, until one beats all causes of a fit or so much
+/// work is done; whether one does.
+fn fit_alone(
+    bench: &Bench,
+    [linear, fit]: [&Fit; 2],
+    found: &mut [(UnnamedLaw, Option<Candidate>)],
+    candidates: &[Candidate],
+    end: u64,
+) -> bool {
     let unnamed = |force: &Candidate| !candidates.iter().any(|own| same(own, force));
     let forces = found.iter_mut().filter_map(|(law, force)| Some((law, force.as_ref()?)));
     for (law, force) in forces.filter(|(_, force)| unnamed(force)).take(FITTED) {
+        if bench.work() > end {
+            return false;
+        }
         law.alone = alone(bench, linear, force);
+        if law.beats(bench, fit) {
+            return true;
+        }
     }
+    false
 }
 
 /// The linear model with those causes of a fit that imitate no law: the course of the input between samples and what is added
