@@ -79,7 +79,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 11,
+        version: 12,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -119,6 +119,13 @@ impl Stage for Decay {
             rows.iter().filter(|row| row.rejected.is_empty()).map(|row| row.record.as_str()).collect();
         for row in rows.iter().filter(|row| row.steady && !decays.contains(row.record.as_str())) {
             cx.warn(format!("{}: {}", row.record, row.rejected));
+        }
+        let clipped: usize = rows.iter().map(|row| row.clipped).sum();
+        if clipped > 0 {
+            cx.warn(format!(
+                "{clipped} samples lie at an end of their channel's range, as of an amplifier or converter that was overdriven: \
+                 they are left out (column `clipped` of `events`)"
+            ));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();
         let rate_error = RateError::of_records(records);

@@ -2,6 +2,7 @@
 
 mod at_hand;
 mod example;
+mod overdriven;
 mod part;
 mod selection;
 mod series;

@@ -3,6 +3,7 @@
 use afmid_pipeline::{Array, Axis, Document, StageError};
 use serde_json::{Value, json};
 
+use super::overdriven;
 use super::part::Part;
 use super::stage::Columns;
 use super::stretch::{Removal, Stretch, Trend, halves};
@@ -178,6 +179,12 @@ impl Series {
                 self.all.samples * self.all.outputs.len()
             ));
         }
+        let (all, names) = (&self.all, |names: &[String], place: usize| names.get(place).cloned().unwrap_or_default());
+        let inputs = all.inputs.iter().enumerate().map(|(k, values)| (names(&all.input_names, k), values, true));
+        let outputs = all.outputs.iter().enumerate().map(|(k, values)| (names(&all.output_names, k), values, false));
+        let cut =
+            inputs.chain(outputs).filter_map(|(name, values, is_input)| overdriven::remark(&name, values, is_input));
+        warnings.extend(cut);
         warnings
     }
 }
