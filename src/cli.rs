@@ -19,7 +19,9 @@ pub use at_once::{AtOnceArgs, ModesArgs};
 pub use batch::{BatchArgs, SetsArgs};
 pub use examples::command;
 pub use export::{ExportArgs, ExportFormat, ModelFormat, ShapeFormat};
-pub use new::{Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordingsArgs, RecordsAre};
+pub use new::{
+    Goal, New, NewCauseArgs, NewFolderArgs, NewPipelineArgs, NewStageArgs, RecordingsArgs, RecordsAre, SpringArgs,
+};
 pub use plugins::{AllowArgs, PluginCommand, TrustArgs};
 pub use provenance::{CrateArgs, DiffArgs, GcArgs, RerunArgs, TraceArgs};
 pub use submit::{SlurmArgs, SubmitTo};

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use afmid_stages::calibration::ContactSpring;
 use clap::{Args, Subcommand, ValueEnum};
 
 /// What to begin.
@@ -90,6 +91,9 @@ pub struct NewPipelineArgs {
     /// What to find [default: what the recordings look like].
     #[arg(long, value_enum)]
     pub goal: Option<Goal>,
+    /// What a spring constant needs beside recordings.
+    #[command(flatten)]
+    pub spring: SpringArgs,
     /// The config [default: the goal's name with `.toml`, in the working directory]; a file that is there is left
     /// alone.
     #[arg(short, long, value_name = "CONFIG.toml")]
@@ -97,6 +101,29 @@ pub struct NewPipelineArgs {
     /// What was written, as JSON, alone on stdout.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What no file says and `--goal spring-constant` needs.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct SpringArgs {
+    /// Of a spring constant: travel of the piezo in metres a volt of its monitor, where its channel is in volts.
+    #[arg(long, value_name = "M_PER_V", value_parser = above_zero)]
+    pub piezo: Option<f64>,
+    /// Of a spring constant: stiffness of the contact between tip and sample in N/m, or `rigid` where it is much stiffer
+    /// than the lever.
+    #[arg(long, value_name = "N_PER_M", value_parser = contact)]
+    pub contact: Option<ContactSpring>,
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0);
+    value.ok_or_else(|| "wanted a number above 0".to_owned())
+}
+
+fn contact(text: &str) -> Result<ContactSpring, String> {
+    let stiffness =
+        || above_zero(text).map(ContactSpring::NPerM).map_err(|wanted| format!("{wanted} in N/m, or rigid"));
+    if text == "rigid" { Ok(ContactSpring::Rigid) } else { stiffness() }
 }
 
 /// Recordings, and what the user says of them beside what they hold.
@@ -169,6 +196,8 @@ pub enum Goal {
     Frf,
     /// Resonance, quality factor and noise floor of a resonator that nothing but noise drives.
     Thermal,
+    /// Spring constant of a lever from its thermal motion and the contact's slope in force curves: --piezo, --contact.
+    SpringConstant,
     /// Frequency and harmonics of an oscillation that does not decay.
     Steady,
 }

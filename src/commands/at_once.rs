@@ -11,7 +11,7 @@ use super::report::write_page;
 use super::run::{Computation, default_output, inputs, open_cache, run_and_write};
 use super::target::{Target, prepare};
 use crate::batch::shell::quoted;
-use crate::cli::{AtOnceArgs, Goal};
+use crate::cli::{AtOnceArgs, Goal, SpringArgs};
 use crate::failure::Failure;
 use crate::output::say;
 use crate::printable::{one_line, shown};
@@ -28,7 +28,7 @@ pub struct Answered {
 /// files are called by. Errors: of the recordings, a file in the way, a stage.
 pub fn answered(args: &AtOnceArgs, goal: Option<Goal>, kind: &str, registry: &Registry) -> Result<Answered, Failure> {
     let files = Files::of(args, kind)?;
-    let draft = Draft::new(&args.recordings, goal, |_| Ok(files.config.clone()), registry)?;
+    let draft = Draft::new(&args.recordings, goal, SpringArgs::default(), |_| Ok(files.config.clone()), registry)?;
     let is_there = is_the_same(&draft)?;
     let read = inputs(&draft.plan, &files.config);
     prepare(&files.result, Target::Result, &read)?;

@@ -7,7 +7,7 @@ use afmid_pipeline::{Plan, Registry};
 
 use super::load::plan_text;
 use super::target::provide_folder;
-use crate::cli::{Goal, RecordingsArgs};
+use crate::cli::{Goal, RecordingsArgs, SpringArgs};
 use crate::failure::Failure;
 use crate::relative::folder_of;
 use crate::scaffold::{Wanted, choose, joined_files, left_out, look, pipeline};
@@ -35,6 +35,7 @@ impl Draft {
     pub fn new(
         args: &RecordingsArgs,
         goal: Option<Goal>,
+        spring: SpringArgs,
         path: impl FnOnce(&str) -> Result<PathBuf, Failure>,
         registry: &Registry,
     ) -> Result<Self, Failure> {
@@ -48,6 +49,7 @@ impl Draft {
             rate_hz: args.rate,
             unit: args.unit.as_deref(),
             resample: args.resample,
+            spring,
         };
         let joined = joined_files(&args.paths, &wanted).map_err(usage)?;
         let (source, inputs, channels, reference, notes) = match joined {

@@ -23,6 +23,10 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
         let help = "`afmid diagnose` says what a linear model gets wrong".to_owned();
         return Err(Failure::usage("a diagnosis lists no modes", Some(help)));
     }
+    if args.goal == Some(Goal::SpringConstant) {
+        let help = "`afmid new pipeline --goal spring-constant` writes the config, `afmid run` finds it".to_owned();
+        return Err(Failure::usage("a spring constant is no mode", Some(help)));
+    }
     let answered = answered(&args.at_once, args.goal, KIND, registry)?;
     let last = answered.last();
     let found = answered.summary(last)?;

@@ -30,7 +30,7 @@ fn new_pipeline(args: &NewPipelineArgs, registry: &Registry) -> Result<(), Failu
         let path = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{goal}.toml")));
         is_free(&path).map(|()| path)
     };
-    let draft = Draft::new(&args.recordings, args.goal, path, registry)?;
+    let draft = Draft::new(&args.recordings, args.goal, args.spring, path, registry)?;
     draft.write()?;
     draft.notes.iter().for_each(|note| say(&format!("{}\n", one_line(note))));
     let output = &draft.path;

@@ -15,6 +15,7 @@ use super::lever::{force_curve, is_of_a_lever};
 use super::pipeline::Wanted;
 use super::recordings::Source;
 use super::sensors::{Sensors, left_out, like, sensors};
+use super::spring;
 use super::stated::{does_without_unit, of_rate};
 use super::steps;
 use crate::cli::{Goal, RecordsAre};
@@ -34,6 +35,8 @@ pub struct Choice<'a> {
     pub inputs: Vec<&'a Channel>,
     /// The measured force whose hits begin free decays.
     pub force: Option<&'a Channel>,
+    /// The distance between lever and sample; of a spring constant alone.
+    pub piezo: Option<&'a Channel>,
     /// The frequencies of a power density.
     pub frequencies: Option<&'a Channel>,
     /// Whether the input is a hammer's: short against the record.
@@ -62,6 +65,7 @@ impl<'a> Choice<'a> {
             channels,
             inputs: Vec::new(),
             force: None,
+            piezo: None,
             frequencies: None,
             struck: false,
             period_samples: None,
@@ -86,6 +90,7 @@ pub fn choose<'a>(source: &'a Source, wanted: &Wanted<'_>) -> Result<Choice<'a>,
         let help = "wanted --goal diagnosis, or no --reference".to_owned();
         return Err((format!("--reference {reference}: only a diagnosis is of an axis in its loop"), Some(help)));
     }
+    spring::is_wanted(wanted)?;
     let file = FirstFile::new(source);
     if let Some(choice) = density(&file, wanted)? {
         return Ok(choice);
@@ -131,6 +136,7 @@ fn by_goal<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a>, 
             Some(question) => Err(question),
             None => input_output(file, wanted, Some(goal)),
         },
+        Some(Goal::SpringConstant) => spring::choice(file, wanted),
         Some(goal) => Ok(thermal(file, wanted, one_channel(source, wanted, goal, String::new())?)),
     }
 }

@@ -25,6 +25,9 @@ const STEP: f64 = 0.5;
 /// What names of the channel of the distance between lever and sample contain.
 const DISTANCES: [&str; 6] = ["piezo", "height", "zsens", "zsnsr", "lvdt", "position"];
 
+/// Of these such that say that a sensor measured it.
+const SENSORS: [&str; 5] = ["measured", "sensor", "zsens", "zsnsr", "lvdt"];
+
 /// Formats of force microscopes, and afmid's own; or a channel that is named as a deflection.
 pub fn is_of_a_lever(source: &Source) -> bool {
     let format = source.format.to_lowercase();
@@ -43,7 +46,7 @@ pub fn force_curve(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> Option<String> 
     let named = wanted.channels.first().and_then(|name| source.channels.iter().find(|one| is_named(one, name)));
     let best = named.or_else(|| source.best.and_then(|index| source.channels.get(index)))?;
     if let Some(distance) = distance(source, best) {
-        return Some(format!("snap-offs: {} has the distance {distance}, too", source.name()));
+        return Some(format!("snap-offs: {} has the distance {}, too", source.name(), distance.location));
     }
     let ruptures = source
         .files
@@ -57,15 +60,19 @@ pub fn force_curve(file: &FirstFile<'_>, wanted: &Wanted<'_>) -> Option<String> 
     Some(format!("snap-offs: a rupture at {at} of {name}"))
 }
 
-/// The channel of the distance between lever and sample, if it moves.
-fn distance<'a>(source: &'a Source, signal: &Channel) -> Option<&'a str> {
+/// The channel of the distance between lever and sample, if it moves: a sensor's before what was commanded.
+pub fn distance<'a>(source: &'a Source, signal: &Channel) -> Option<&'a Channel> {
     let moves = |channel: &Channel| channel.values.as_ref().is_none_or(|values| values.least < values.largest);
     let named = |channel: &Channel| {
         let name = channel.location.rsplit(['/', '.']).next().unwrap_or_default().to_lowercase();
         name == "z" || DISTANCES.iter().any(|distance| name.contains(distance))
     };
-    let found = source.channels.iter().find(|one| one.location != signal.location && named(one) && moves(one));
-    found.map(|channel| channel.location.as_str())
+    let distances = || source.channels.iter().filter(|one| one.location != signal.location && named(one) && moves(one));
+    let sensed = |channel: &&Channel| {
+        let name = channel.location.to_lowercase();
+        SENSORS.iter().any(|sensor| name.contains(sensor))
+    };
+    distances().find(sensed).or_else(|| distances().next())
 }
 
 /// The sample at which a contact ruptures in a file; none where none does, or it cannot be read.

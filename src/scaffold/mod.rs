@@ -16,6 +16,7 @@ mod pipeline;
 mod points;
 mod recordings;
 mod sensors;
+mod spring;
 mod stage;
 mod stated;
 mod steps;

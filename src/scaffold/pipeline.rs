@@ -11,8 +11,9 @@ use super::density;
 use super::diagnosis_config;
 use super::points;
 use super::recordings::Source;
+use super::spring;
 use super::stated;
-use crate::cli::{Goal, RecordsAre};
+use crate::cli::{Goal, RecordsAre, SpringArgs};
 use crate::inspect::Channel;
 use crate::printable::one_line;
 use crate::relative::{literally, relative};
@@ -30,6 +31,8 @@ pub struct Wanted<'a> {
     pub rate_hz: Option<f64>,
     pub unit: Option<&'a str>,
     pub resample: bool,
+    /// Of a spring constant.
+    pub spring: SpringArgs,
 }
 
 impl Goal {
@@ -44,6 +47,7 @@ impl Goal {
             Self::InputOutput => include_str!("../../configs/input-output.toml"),
             Self::Frf => include_str!("../../configs/frf.toml"),
             Self::Thermal => include_str!("../../configs/thermal.toml"),
+            Self::SpringConstant => include_str!("../../configs/spring-constant.toml"),
             Self::Steady => include_str!("../../configs/steady.toml"),
         }
     }
@@ -59,6 +63,7 @@ impl Goal {
             Self::InputOutput => "input-output",
             Self::Frf => "frf",
             Self::Thermal => "thermal",
+            Self::SpringConstant => "spring-constant",
             Self::Steady => "steady",
         }
     }
@@ -132,6 +137,12 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
             }
             // the band is one of its data
             Some(("params", _)) if stage == "\"spectrum.thermal\"" => {}
+            Some(("params", _)) if stage == "\"calibration.sensitivity\"" => {
+                text.push_str(&spring::sensitivity(choice, wanted.spring));
+            }
+            Some(("params", _)) if stage == "\"calibration.stiffness\"" => {
+                text.push_str(&spring::stiffness(choice, wanted.spring));
+            }
             Some(("params", _)) if stage == "\"events.decay\"" => {
                 let records_are = match choice.records_are {
                     None => "auto",
@@ -156,10 +167,11 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
                 text.push_str(&format!("params = {{ blocks = \"{blocks}\"{before}{quantity} }}\n"));
             }
             Some(("params", _)) if stage == "\"spectrum.welch\"" => {
-                let usual = segment_samples(choice.channels[0].samples);
                 let (stretches, samples) = match choice.free_stretches {
-                    true => ("free", (2 * usual).min(MOST_FREE_SAMPLES)),
-                    false => ("all", choice.segment_samples.unwrap_or(usual)),
+                    true => ("free", free_segment_samples(choice)),
+                    false => {
+                        ("all", choice.segment_samples.unwrap_or_else(|| segment_samples(choice.channels[0].samples)))
+                    }
                 };
                 text.push_str(&format!("params = {{ segment_samples = {samples}, stretches = \"{stretches}\" }}\n"));
             }
@@ -181,6 +193,10 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
 /// then; in a quarter of that a line and a mode are hard to tell apart.
 const MOST_FREE_SAMPLES: usize = 65_536;
 
+pub fn free_segment_samples(choice: &Choice<'_>) -> usize {
+    (2 * segment_samples(choice.channels[0].samples)).min(MOST_FREE_SAMPLES)
+}
+
 /// The `params` of the stage `records`.
 fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Path) -> Result<String, Question> {
     let text = |text: &str| Value::String(text.to_owned());
@@ -198,6 +214,9 @@ fn records(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder: &Pa
     }
     if matches!(choice.goal, Goal::Decay | Goal::Thermal | Goal::Steady) {
         params.insert("piezo_channel".to_owned(), text(""));
+    }
+    if let Some(piezo) = choice.piezo {
+        params.insert("piezo_channel".to_owned(), text(&piezo.location));
     }
     if source.resample {
         params.insert("resample".to_owned(), Value::Boolean(true));
@@ -323,6 +342,7 @@ mod tests {
             rate_hz: None,
             unit: None,
             resample: false,
+            spring: SpringArgs::default(),
         }
     }
 

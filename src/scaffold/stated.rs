@@ -40,7 +40,7 @@ pub fn of_rate(channel: &Channel, wanted: &Wanted<'_>) -> Option<String> {
 
 /// Whether a config does without a unit that nobody states: of decays and noise it scales the amplitudes alone.
 pub fn does_without_unit(goal: Goal, channel: &Channel, wanted: &Wanted<'_>) -> bool {
-    let scales_alone = matches!(goal, Goal::Decay | Goal::Thermal | Goal::Steady);
+    let scales_alone = matches!(goal, Goal::Decay | Goal::Thermal | Goal::SpringConstant | Goal::Steady);
     scales_alone && channel.unit.is_empty() && wanted.unit.is_none()
 }
 

@@ -23,6 +23,7 @@ mod readers;
 mod registry;
 mod report;
 mod results;
+mod spring_constant;
 mod submit;
 mod sweep;
 mod threads;

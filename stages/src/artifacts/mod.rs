@@ -51,7 +51,7 @@ pub(crate) use pair::{
     NewPair, Pair, PairSeries, PairSet, with_channel_names, with_counts, with_record_starts, with_taken_off,
 };
 pub(crate) use quantity::Understood;
-pub use quantity::quantity_of_unit;
+pub use quantity::{length_m, quantity_of_unit};
 pub(crate) use rate_error::RateError;
 pub(crate) use ringing::{ringing, ringing_array};
 pub(crate) use roots::{RootRow, root_table, roots};

@@ -65,6 +65,11 @@ const FORCES: [(&str, f64); 4] = [("/kN", 1e3), ("/mN", 1e-3), ("/uN", 1e-6), ("
 /// Metres of each unit of length; the longest name that fits counts.
 const LENGTHS: [(&str, f64); 7] =
     [("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6), ("nm", 1e-9), ("m", 1.0)];
+/// Metres of a unit of length; none of any other unit.
+pub fn length_m(unit: &str) -> Option<f64> {
+    LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres)
+}
+
 /// Standard acceleration of gravity, exact (CGPM 1901).
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
 
@@ -98,6 +103,10 @@ mod tests {
         assert_eq!(of("(m/s\u{b2})/N"), (Quantity::Accelerance, 1.0));
         assert_eq!(of("(m/s^2)/kN"), (Quantity::Accelerance, 1e-3));
         assert_eq!(of("g/N"), (Quantity::Accelerance, 9.806_65));
+        assert_eq!(
+            (length_m("nm"), length_m("m"), length_m("V"), length_m("m/s")),
+            (Some(1e-9), Some(1.0), None, None)
+        );
         for other in ["", "V/N", "m", "m/V", "N/m", "mol/N", "m/s^3/N"] {
             assert_eq!(known(other), None, "{other}");
         }

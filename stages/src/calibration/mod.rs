@@ -1,6 +1,7 @@
 //! The stages of calibration and noise control: sensitivity, spring constant, delay, thermal spectra. Kernels:
 //! [`afmid_kernels::calibration`].
 
+mod contact_spring;
 mod delay;
 mod example;
 mod free_rule;
@@ -12,6 +13,7 @@ mod thermal;
 
 #[cfg(test)]
 mod stage_tests;
+pub use contact_spring::ContactSpring;
 pub use delay::Delay;
 pub(crate) use example::free_records;
 pub use free_rule::FreeSettings;

@@ -26,6 +26,11 @@ pub struct PeakSettings {
     pub band: f64,
 }
 
+/// Standard errors by which the variance of a lower peak is above that of a higher one.
+const LEAST_DISTANCE: f64 = 4.0;
+/// Quality factor of a lower peak: what 1/f noise is fitted by has less than one, a lever in water two.
+const LEAST_QUALITY: f64 = 1.5;
+
 impl Default for PeakSettings {
     fn default() -> Self {
         Self { segment_samples: 16_384, lowest_hz: 10e3, highest_hz: 150e3, band: 2.5 }
@@ -43,7 +48,26 @@ impl PeakSettings {
         });
     }
 
-    /// The peak in an averaged spectrum. Errors: none, or no fit.
+    /// Of the peaks in an averaged spectrum that of mode 1: by equipartition it has the most variance, a higher mode stands
+    /// out more against 1/f. Errors: no peak, or no fit.
+    pub(super) fn fit_first_mode(&self, spectrum: &AveragedPeriodogram) -> Result<ThermalFit, SpectrumError> {
+        let mut first = self.fit(spectrum)?;
+        loop {
+            let below = Self { highest_hz: first.frequency_hz.value / self.band, ..*self };
+            if below.highest_hz <= below.lowest_hz {
+                return Ok(first);
+            }
+            let Ok(lower) = below.fit(spectrum) else { return Ok(first) };
+            let (gain, std) =
+                (lower.variance.value - first.variance.value, lower.variance.std.hypot(first.variance.std));
+            if !(gain > LEAST_DISTANCE * std && lower.quality_factor.value > LEAST_QUALITY) {
+                return Ok(first);
+            }
+            first = lower;
+        }
+    }
+
+    /// The peak that stands out most in an averaged spectrum. Errors: none, or no fit.
     pub(super) fn fit(&self, spectrum: &AveragedPeriodogram) -> Result<ThermalFit, SpectrumError> {
         let density = AveragedDensity {
             frequency_hz: &spectrum.frequency_hz(),

@@ -8,6 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::free_rule::FreeSettings;
+use crate::artifacts::{PIEZO, length_m};
+
 use super::reading::{common_rate, read_blocks, read_free};
 use afmid_kernels::calibration::{
     ContactSlope, Estimate, Sensitivity, SlopeGauge, SlopeStretch, contact_slope, contact_stretches, sensitivity,
@@ -25,21 +27,21 @@ use afmid_kernels::calibration::{
 /// # Shapes
 /// `slopes`: one row per stretch.
 /// # Units
-/// V/m; the slope in V of deflection per V of piezo monitor.
+/// V/m; the slope in V of deflection per unit of the piezo's channel, a volt of its monitor or a length.
 /// # Accuracy
 /// Standard error from the scatter of the stretches and the piezo's own uncertainty: 0.03 % for the paper's archive.
 /// Not covered: a contact that is softer than stated, and a detector that is not linear over its range.
 /// # Errors
-/// No piezo channel; fewer than two straight stretches.
+/// No piezo channel, or one of a monitor whose travel per volt is not stated; fewer than two straight stretches.
 /// # Source
 /// H.-J. Butt, B. Cappella and M. Kappl, Surf. Sci. Rep. 59 (2005) 1, section on calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Sensitivity")]
 pub struct SlopeSensitivity {
-    /// Travel of the piezo per monitored volt in m/V.
+    /// Travel of the piezo per monitored volt in m/V; absent of a channel in a unit of length alone.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub piezo_m_per_v: f64,
+    pub piezo_m_per_v: Option<f64>,
     /// Its standard uncertainty in m/V, not negative. 0: not known, left out.
     #[schemars(range(min = 0.0))]
     pub piezo_m_per_v_std: f64,
@@ -57,7 +59,7 @@ pub struct SlopeSensitivity {
 impl Default for SlopeSensitivity {
     fn default() -> Self {
         Self {
-            piezo_m_per_v: 25e-9,
+            piezo_m_per_v: None,
             piezo_m_per_v_std: 0.0,
             contact_stiffness_n_per_m: None,
             stiffness_n_per_m: None,
@@ -101,7 +103,7 @@ pub struct SensitivitySummary {
 impl Stage for SlopeSensitivity {
     const SPEC: Spec = Spec {
         name: "calibration.sensitivity",
-        version: 1,
+        version: 2,
         summary: "optical lever sensitivity from the contact slope, corrected for a soft contact",
         inputs: &[RECORDS.spec()],
         outputs: &[SLOPES.spec(), SUMMARY.spec()],
@@ -110,14 +112,19 @@ impl Stage for SlopeSensitivity {
     };
 
     fn check(&self, faults: &mut Faults) {
-        let (value, std) = (self.piezo_m_per_v, self.piezo_m_per_v_std);
-        faults
-            .require(std <= value, || format!("`piezo_m_per_v_std` is {std}, wanted at most `piezo_m_per_v`, {value}"));
+        let std = self.piezo_m_per_v_std;
+        match self.piezo_m_per_v {
+            Some(value) => faults.require(std <= value, || {
+                format!("`piezo_m_per_v_std` is {std}, wanted at most `piezo_m_per_v`, {value}")
+            }),
+            None => faults.require(std == 0.0, || "`piezo_m_per_v_std` is of a travel that is not given".to_owned()),
+        }
     }
 
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
         let rule = self.free.rule(common_rate(records)?, 0);
+        let piezo_m_per_v = self.travel(records)?;
         cx.expect(records.len());
         let per_record = records
             .par_iter()
@@ -131,7 +138,7 @@ impl Stage for SlopeSensitivity {
         let all: Vec<SlopeStretch> = per_record.iter().flatten().copied().collect();
         let slope = contact_slope(&all).map_err(StageError::from_error)?;
         let gauge = SlopeGauge {
-            piezo_m_per_v: Estimate { value: self.piezo_m_per_v, std: self.piezo_m_per_v_std },
+            piezo_m_per_v: Estimate { value: piezo_m_per_v, std: self.piezo_m_per_v_std },
             contact_stiffness_n_per_m: self.contact_stiffness_n_per_m,
             stiffness_n_per_m: self.stiffness_n_per_m,
         };
@@ -170,6 +177,25 @@ fn expect(outputs: &Ports) -> Result<String, String> {
 }
 
 impl SlopeSensitivity {
+    /// Metres of travel per unit of the piezo's channel. Errors: no such channel; neither its unit nor the config says it.
+    fn travel(&self, records: &[Record]) -> Result<f64, StageError> {
+        let Some(record) = records.first() else { return Err(StageError::new("there is no record")) };
+        let unit = record.channel(PIEZO)?.unit.trim();
+        match (length_m(unit), self.piezo_m_per_v) {
+            (None, Some(given)) => Ok(given),
+            (Some(length), None) => Ok(length),
+            (Some(_), Some(_)) => Err(StageError::new(format!("the piezo's channel is in {unit} already"))
+                .at(&record.path)
+                .help("leave `piezo_m_per_v` out")),
+            (None, None) => Err(StageError::new(format!(
+                "how far the piezo travels is not stated: its channel is in {}",
+                if unit.is_empty() { "no unit" } else { unit }
+            ))
+            .at(&record.path)
+            .help("`piezo_m_per_v` in metres a volt of its monitor, from the piezo's own calibration")),
+        }
+    }
+
     fn summary(
         &self,
         slope: &ContactSlope,

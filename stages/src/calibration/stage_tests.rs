@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use afmid_pipeline::recording::{InputFiles, Wanted, open_native};
 use afmid_pipeline::{Context, Document, Entry, Port, Ports, Recording, Stage};
 
+use super::contact_spring::ContactSpring;
+use super::peak_settings::PeakSettings;
 use super::sensitivity::{SensitivitySummary, SlopeSensitivity};
 use super::stiffness::{StiffnessSummary, ThermalStiffness};
 use super::thermal::Thermal;
@@ -47,7 +49,9 @@ fn lever_a() -> Ports {
 fn lever_a_has_its_published_sensitivity_and_spring_constant() {
     let records = lever_a();
     let cx = Context::alone(1);
-    let slope = SlopeSensitivity { contact_stiffness_n_per_m: Some(60.0), ..SlopeSensitivity::default() };
+    let unknown = SlopeSensitivity::default().run(&records, &cx).unwrap_err();
+    assert!(unknown.to_string().contains("its channel is in V"), "{unknown}");
+    let slope = SlopeSensitivity { piezo_m_per_v: Some(25e-9), ..SlopeSensitivity::default() };
     let outputs = slope.run(&records, &cx).unwrap();
     let document = outputs.get(&SUMMARY).unwrap().clone();
     let found: SensitivitySummary = document.read().unwrap();
@@ -61,9 +65,22 @@ fn lever_a_has_its_published_sensitivity_and_spring_constant() {
         detector_poles_hz: vec![1.3e6, 1.9e6, 2.4e6],
         ..ThermalStiffness::default()
     };
-    let outputs = thermal.run(&records.clone().with(&SENSITIVITY, document), &cx).unwrap();
+    let calibrated = records.clone().with(&SENSITIVITY, document);
+    let unknown = thermal.run(&calibrated, &cx).unwrap_err();
+    assert!(unknown.to_string().contains("stiffness of the contact is not stated"), "{unknown}");
+    // where higher modes are in reach, mode 1 is still the one
+    let peak = PeakSettings { highest_hz: 2e6, ..PeakSettings::default() };
+    let wide = ThermalStiffness { contact_stiffness_n_per_m: Some(ContactSpring::Rigid), peak, ..thermal.clone() };
+    let wide: StiffnessSummary = wide.run(&calibrated, &cx).unwrap().get(&SUMMARY).unwrap().read().unwrap();
+    assert!((4.0e4..5.5e4).contains(&wide.frequency_hz.value), "{wide:?}");
+    let of_contact = |contact| ThermalStiffness { contact_stiffness_n_per_m: Some(contact), ..thermal.clone() };
+    let rigid = of_contact(ContactSpring::Rigid).run(&calibrated, &cx).unwrap();
+    let rigid: StiffnessSummary = rigid.get(&SUMMARY).unwrap().read().unwrap();
+    let outputs = of_contact(ContactSpring::NPerM(60.0)).run(&calibrated, &cx).unwrap();
     let found: StiffnessSummary = outputs.get(&SUMMARY).unwrap().read().unwrap();
     let (k, s) = (found.stiffness_n_per_m, found.sensitivity_v_per_m);
+    // (60 / 63.8)^2: what a contact of 60 N/m takes from 3.8 N/m where it is not known
+    assert!((rigid.stiffness_n_per_m.value / k.value - 0.884).abs() < 5e-3, "{rigid:?}");
     // its temperature is not stated (293 to 300 K): one per cent beside two standard errors
     assert!((k.value - 3.8).abs() < 2.0 * k.std + 0.04, "{k:?}");
     // the correction follows from k, of whose relative error it takes 0.06 / 1.06

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::contact_spring::ContactSpring;
 use super::free_rule::FreeSettings;
 use super::peak_settings::PeakSettings;
 use super::reading::{common_rate, push_free, read_blocks, read_free};
@@ -24,16 +25,17 @@ use afmid_kernels::spectra::{Fitted, ThermalFit};
 /// solved together.
 /// # Method
 /// Free stretches by level and noise; averaged Hann periodograms; harmonic oscillator, white and 1/f noise by Whittle's
-/// likelihood.
+/// likelihood; of several peaks that of most variance.
 /// # Shapes
 /// `spectrum`: density and fitted model over frequency.
 /// # Units
 /// N/m; V^2/Hz.
 /// # Accuracy
 /// Relative variance of the peak `1 / sqrt(pi f1 T / Q)` for T seconds of free flight: 0.9 % for the paper's archive;
-/// twice the sensitivity's, the temperature's and the mode shape's uncertainty added in squares.
+/// twice the sensitivity's, the temperature's, the mode shape's and the contact's uncertainty added in squares.
 /// # Errors
-/// No free stretch of a segment's length, no peak, no sensitivity, a contact too soft for any lever.
+/// No free stretch of a segment's length, no peak, no sensitivity, a contact of which nothing is stated or that is too soft
+/// for any lever.
 /// # Source
 /// H.-J. Butt and M. Jaschke, Nanotechnology 6 (1995) 1; P. Whittle, Ark. Mat. 2 (1953) 423.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -46,10 +48,12 @@ pub struct ThermalStiffness {
     /// Its standard error in V/m, not negative.
     #[schemars(range(min = 0.0))]
     pub sensitivity_std_v_per_m: f64,
-    /// Contact stiffness in N/m under the contact slope, where the sensitivity is not corrected yet; absent: as
-    /// `sensitivity` says, or rigid.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub contact_stiffness_n_per_m: Option<f64>,
+    /// Contact stiffness in N/m under the contact slope, where the sensitivity is not corrected yet, or `"rigid"`; absent: as
+    /// `sensitivity` says, which has to; of a given number none.
+    pub contact_stiffness_n_per_m: Option<ContactSpring>,
+    /// Its standard uncertainty in N/m, not negative. 0: not known, left out.
+    #[schemars(range(min = 0.0))]
+    pub contact_stiffness_std_n_per_m: f64,
     /// Temperature in K.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub temperature_k: f64,
@@ -78,6 +82,7 @@ impl Default for ThermalStiffness {
             sensitivity_v_per_m: None,
             sensitivity_std_v_per_m: 0.0,
             contact_stiffness_n_per_m: None,
+            contact_stiffness_std_n_per_m: 0.0,
             temperature_k: 295.0,
             temperature_std_k: 2.0,
             mode_shape_factor: UNIFORM_BEAM_FACTOR,
@@ -141,12 +146,15 @@ pub struct RelativeErrors {
     pub temperature: f64,
     /// Mode shape.
     pub mode_shape: f64,
+    /// Contact stiffness.
+    #[serde(default)]
+    pub contact: f64,
 }
 
 impl Stage for ThermalStiffness {
     const SPEC: Spec = Spec {
         name: "calibration.stiffness",
-        version: 3,
+        version: 4,
         summary: "spring constant from the thermal peak of mode 1 in the free stretches",
         inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
         outputs: &[SPECTRUM.spec(), SUMMARY.spec()],
@@ -161,6 +169,19 @@ impl Stage for ThermalStiffness {
         ];
         for (name, std, of, value) in shares {
             faults.require(std <= value, || format!("`{name}` is {std}, wanted at most `{of}`, {value}"));
+        }
+        match self.contact_stiffness_n_per_m {
+            Some(ContactSpring::NPerM(contact)) => {
+                faults
+                    .require(contact > 0.0, || format!("`contact_stiffness_n_per_m` is {contact}, wanted more than 0"));
+                let std = self.contact_stiffness_std_n_per_m;
+                faults.require(std <= contact, || {
+                    format!("`contact_stiffness_std_n_per_m` is {std}, wanted at most `contact_stiffness_n_per_m`, {contact}")
+                });
+            }
+            _ => faults.require(self.contact_stiffness_std_n_per_m == 0.0, || {
+                "`contact_stiffness_std_n_per_m` is of a stiffness that is not given".to_owned()
+            }),
         }
         self.peak.check(faults);
     }
@@ -186,7 +207,7 @@ impl Stage for ThermalStiffness {
         parts.iter().for_each(|(part, _)| welch.merge(part));
         let free_samples: usize = parts.iter().map(|(_, samples)| samples).sum();
         let average = welch.average().map_err(StageError::from_error)?;
-        let peak = self.peak.fit(&average).map_err(StageError::from_error)?;
+        let peak = self.peak.fit_first_mode(&average).map_err(StageError::from_error)?;
         let estimate = |fitted: Fitted| Estimate { value: fitted.value, std: fitted.std };
         let variance = estimate(peak.variance);
         let mut frequency_hz = estimate(peak.frequency_hz);
@@ -204,7 +225,7 @@ impl Stage for ThermalStiffness {
             stiffness_n_per_m: k.stiffness_n_per_m,
             apparent_n_per_m: k.apparent_n_per_m,
             sensitivity_v_per_m: k.sensitivity_v_per_m,
-            contact_stiffness_n_per_m: gauge.contact_stiffness_n_per_m,
+            contact_stiffness_n_per_m: gauge.contact_stiffness_n_per_m.map(|contact| contact.value),
             frequency_hz,
             quality_factor: estimate(peak.quality_factor),
             variance_v2: variance,
@@ -215,6 +236,7 @@ impl Stage for ThermalStiffness {
                 sensitivity: k.relative_errors[1],
                 temperature: k.relative_errors[2],
                 mode_shape: k.relative_errors[3],
+                contact: k.relative_errors[4],
             },
             dispersion: peak.dispersion,
             lines_hz: peak.lines.iter().map(|line| line.frequency_hz).collect(),
@@ -254,12 +276,23 @@ impl ThermalStiffness {
                 if summary.corrected {
                     (summary.sensitivity_v_per_m, None)
                 } else {
-                    (summary.apparent_v_per_m, self.contact_stiffness_n_per_m.or(summary.contact_stiffness_n_per_m))
+                    let stated = summary.contact_stiffness_n_per_m.map(ContactSpring::NPerM);
+                    let contact = self.contact_stiffness_n_per_m.or(stated).ok_or_else(|| {
+                        StageError::new(
+                            "the stiffness of the contact is not stated: one that gives way under the lever \
+                                         makes the slope, and the spring constant from it, too low",
+                        )
+                        .help(
+                            "`contact_stiffness_n_per_m` in N/m, or \"rigid\" of a contact much stiffer than the lever",
+                        )
+                    })?;
+                    (summary.apparent_v_per_m, contact.n_per_m())
                 }
             }
-            (None, Some(value)) => {
-                (Estimate { value, std: self.sensitivity_std_v_per_m }, self.contact_stiffness_n_per_m)
-            }
+            (None, Some(value)) => (
+                Estimate { value, std: self.sensitivity_std_v_per_m },
+                self.contact_stiffness_n_per_m.and_then(ContactSpring::n_per_m),
+            ),
             (None, None) => {
                 return Err(StageError::new(
                     "no sensitivity: neither `sensitivity` is wired nor `sensitivity_v_per_m` given",
@@ -269,7 +302,7 @@ impl ThermalStiffness {
         };
         Ok(ThermalGauge {
             sensitivity_v_per_m: sensitivity,
-            contact_stiffness_n_per_m: contact,
+            contact_stiffness_n_per_m: contact.map(|value| Estimate { value, std: self.contact_stiffness_std_n_per_m }),
             temperature_k: Estimate { value: self.temperature_k, std: self.temperature_std_k },
             mode_shape_factor: Estimate { value: self.mode_shape_factor, std: self.mode_shape_factor_std },
             detector_pole_hz: self.detector_poles_hz.clone(),

@@ -20,7 +20,7 @@ mod spectrum;
 mod spectrum_example;
 mod stretch_extremes;
 
-pub use crate::artifacts::quantity_of_unit;
+pub use crate::artifacts::{length_m, quantity_of_unit};
 pub use census::Census;
 pub use code_census::{CensusSettings, ChannelCensus, Found};
 pub use columns::Columns;

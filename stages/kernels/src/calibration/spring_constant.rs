@@ -14,7 +14,7 @@ pub struct ThermalGauge {
     /// here.
     pub sensitivity_v_per_m: Estimate,
     /// Contact stiffness for a joint correction; `None`: the sensitivity is taken as it is.
-    pub contact_stiffness_n_per_m: Option<f64>,
+    pub contact_stiffness_n_per_m: Option<Estimate>,
     /// Temperature, K.
     pub temperature_k: Estimate,
     /// `c_slope_1^2 / c_tip_1`.
@@ -34,8 +34,9 @@ pub struct SpringConstant {
     pub sensitivity_v_per_m: Estimate,
     /// `|D(f1)|^2` of the detector poles, by which the peak's variance was divided.
     pub attenuation: f64,
-    /// Shares of the relative error: peak, sensitivity, temperature, mode shape.
-    pub relative_errors: [f64; 4],
+    /// Shares of the relative error, before a soft contact makes them grow: peak, sensitivity, temperature, mode shape,
+    /// contact.
+    pub relative_errors: [f64; 5],
 }
 
 /// Stiffness from the variance of the signal in mode 1.
@@ -48,7 +49,8 @@ pub struct SpringConstant {
 /// chi k_B T |D|^2 / <v_1^2>` then gives `k = r (1 + k/k_c)^2`, of which the smaller root is the spring constant.
 ///
 /// # Accuracy
-/// First-order error propagation; with a soft contact all relative errors grow by `(1 + k/k_c) / (1 - k/k_c)`.
+/// First-order error propagation. With a soft contact its own relative error counts `2 x / (1 + x)` times, `x = k/k_c`, and
+/// all of them grow by `(1 + x) / (1 - x)`.
 ///
 /// # Errors
 /// Arguments not above zero; a contact too soft for any lever (`r >= k_c / 4`).
@@ -72,41 +74,43 @@ pub fn spring_constant(
     let attenuation = attenuation(frequency_hz, &gauge.detector_pole_hz);
     let thermal = BOLTZMANN_J_PER_K * temperature.value;
     let apparent = sensitivity.value.powi(2) * factor.value * thermal * attenuation / variance_v2.value;
-    let relative_errors = [
-        variance_v2.std / variance_v2.value,
-        2.0 * sensitivity.std / sensitivity.value,
-        temperature.std / temperature.value,
-        factor.std / factor.value,
-    ];
-    let relative = relative_errors.iter().map(|e| e * e).sum::<f64>().sqrt();
-    let (stiffness, growth) = match gauge.contact_stiffness_n_per_m {
-        None => (apparent, 1.0),
+    let (x, contact_relative) = match gauge.contact_stiffness_n_per_m {
+        None => (0.0, 0.0),
         Some(contact) => {
-            positive("contact_stiffness_n_per_m", contact)?;
-            let ratio = apparent / contact;
+            positive("contact_stiffness_n_per_m", contact.value)?;
+            let ratio = apparent / contact.value;
             if ratio >= 0.25 {
                 return Err(CalibrationError::Value {
                     name: "contact_stiffness_n_per_m",
-                    got: contact,
+                    got: contact.value,
                     wanted: "wanted more than four times the apparent spring constant: no lever gives this slope over a softer contact",
                 });
             }
             // x = k/k_c solves x = ratio (1 + x)^2
             let x = (1.0 - 2.0 * ratio - (1.0 - 4.0 * ratio).sqrt()) / (2.0 * ratio);
-            (contact * x, (1.0 + x) / (1.0 - x))
+            (x, contact.std / contact.value)
         }
     };
-    let stiffness_std = stiffness * relative * growth;
-    let sensitivity_factor = gauge.contact_stiffness_n_per_m.map_or(1.0, |contact| 1.0 + stiffness / contact);
-    // the correction is as uncertain as k
+    let growth = (1.0 + x) / (1.0 - x);
+    let relative_errors = [
+        variance_v2.std / variance_v2.value,
+        2.0 * sensitivity.std / sensitivity.value,
+        temperature.std / temperature.value,
+        factor.std / factor.value,
+        2.0 * x / (1.0 + x) * contact_relative,
+    ];
+    let norm = |errors: &[f64]| errors.iter().map(|e| e * e).sum::<f64>().sqrt();
+    let stiffness = gauge.contact_stiffness_n_per_m.map_or(apparent, |contact| contact.value * x);
+    let stiffness_std = stiffness * norm(&relative_errors) * growth;
+    // the correction is as uncertain as k from all else, and as the contact, which k follows
     let correction_std =
-        gauge.contact_stiffness_n_per_m.map_or(0.0, |contact| sensitivity.value * stiffness_std / contact);
+        sensitivity.value * x * (norm(&relative_errors[..4]) * growth).hypot((1.0 + x) / (1.0 - x) * contact_relative);
     Ok(SpringConstant {
         stiffness_n_per_m: Estimate { value: stiffness, std: stiffness_std },
         apparent_n_per_m: apparent,
         sensitivity_v_per_m: Estimate {
-            value: sensitivity.value * sensitivity_factor,
-            std: (sensitivity.std * sensitivity_factor).hypot(correction_std),
+            value: sensitivity.value * (1.0 + x),
+            std: (sensitivity.std * (1.0 + x)).hypot(correction_std),
         },
         attenuation,
         relative_errors,
@@ -153,13 +157,29 @@ mod tests {
         let apparent = spring_constant(46.3e3, variance, &gauge).unwrap();
         // (1 + k/k_c)^-2 = 0.8844: 11.6 % low; to be multiplied by 1.13
         assert!((apparent.stiffness_n_per_m.value / k - 0.8844).abs() < 1e-4);
-        gauge.contact_stiffness_n_per_m = Some(k_c);
+        gauge.contact_stiffness_n_per_m = Some(exact(k_c));
         let corrected = spring_constant(46.3e3, variance, &gauge).unwrap();
         assert!((corrected.stiffness_n_per_m.value / k - 1.0).abs() < 1e-12);
         assert!((corrected.sensitivity_v_per_m.value / s - 1.0).abs() < 1e-12);
         let (relative, x) = (corrected.stiffness_n_per_m.std / k, k / k_c);
         assert!((relative / (0.01 * (1.0 + x) / (1.0 - x)) - 1.0).abs() < 1e-9);
-        gauge.contact_stiffness_n_per_m = Some(10.0);
+        // a contact that is another by 1 %: k and the sensitivity move as their errors say
+        let of_contact = |value: f64, std: f64| {
+            let contact_stiffness_n_per_m = Some(Estimate { value, std });
+            let mode_shape_factor = exact(chi);
+            spring_constant(
+                46.3e3,
+                variance,
+                &ThermalGauge { contact_stiffness_n_per_m, mode_shape_factor, ..gauge.clone() },
+            )
+            .unwrap()
+        };
+        let (stated, moved) = (of_contact(k_c, 0.01 * k_c), of_contact(1.01 * k_c, 0.0));
+        let step = |of: fn(&SpringConstant) -> Estimate| (of(&moved).value - of(&stated).value).abs() / of(&stated).std;
+        // the second order of 1 %
+        assert!((step(|k| k.stiffness_n_per_m) - 1.0).abs() < 0.02);
+        assert!((step(|k| k.sensitivity_v_per_m) - 1.0).abs() < 0.02);
+        gauge.contact_stiffness_n_per_m = Some(exact(10.0));
         assert!(spring_constant(46.3e3, variance, &gauge).is_err());
     }
 

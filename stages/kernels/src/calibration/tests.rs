@@ -96,7 +96,7 @@ fn calibration_finds_the_simulated_truth() {
     assert!((peak.quality_factor.value - 40.8).abs() < 4.0 * peak.quality_factor.std, "{peak:?}");
     let thermal = ThermalGauge {
         sensitivity_v_per_m: found.apparent_v_per_m,
-        contact_stiffness_n_per_m: Some(60.0),
+        contact_stiffness_n_per_m: Some(Estimate { value: 60.0, std: 0.0 }),
         temperature_k: Estimate { value: TEMPERATURE_K, std: 0.0 },
         mode_shape_factor: Estimate { value: FACTOR, std: 0.0 },
         detector_pole_hz: ClosedForm::paper().detector_pole_hz,
