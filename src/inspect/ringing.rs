@@ -7,7 +7,7 @@ use afmid_pipeline::StageError;
 use afmid_pipeline::recording::FoundChannel;
 
 use super::verdict::Answer;
-use crate::show::number;
+use crate::show::{about, number};
 
 /// Samples that are searched: a long record's first ones.
 const MOST_SEARCHED: usize = 1 << 22;
@@ -68,7 +68,7 @@ fn of_search(search: &DecaySearch, rate: f64, since: usize) -> (Answer, String) 
         (Some(first), _) => {
             let start_s = (since + first.range.start) as f64 / rate;
             let (frequency, samples) = (first.frequency_hz, rate / first.frequency_hz);
-            let at = format!("at {} Hz: {samples:.1} samples a period", number(frequency));
+            let at = format!("at {} Hz: {samples:.1} samples a period", about(frequency));
             let where_from = format!("from {} s on, {at}", number(start_s));
             (Answer::Yes, format!("{} {where_from}", counted(search.decays.len())))
         }

@@ -162,7 +162,7 @@ mod tests {
         };
         for (channel, answer, word) in [
             (good(Some(5e3)), Answer::Yes, "a free decay from 0.2"),
-            (good(Some(5e3)), Answer::Yes, "at 249.98"),
+            (good(Some(5e3)), Answer::Yes, "at about 250 Hz"),
             (good(None), Answer::Unknown, "20.0 samples a period; the file states no sample rate"),
             (channel("/a", Some(5e3), rings(false)), Answer::No, "steady oscillation at 250"),
             (channel("/a", None, rings(false)), Answer::No, "steady oscillation of 20.0 samples a period"),

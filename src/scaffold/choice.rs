@@ -20,7 +20,7 @@ use super::stated::{does_without_unit, of_rate};
 use super::steps;
 use crate::cli::{Goal, RecordsAre};
 use crate::inspect::{Channel, counted};
-use crate::show::number;
+use crate::show::{about, number};
 
 /// Why something cannot be chosen, and what to do.
 pub type Question = (String, Option<String>);
@@ -370,7 +370,7 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
     let why = match (found.decays.first(), found.reason()) {
         (Some(first), _) => {
             let time_s = first.range.start as f64 / file.rate(seen[0], wanted)?;
-            let from = format!("from {} s on, at {} Hz", number(time_s), number(first.frequency_hz));
+            let from = format!("from {} s on, at {} Hz", number(time_s), about(first.frequency_hz));
             let beside =
                 found.steady.first().map(|line| format!(", beside a line at {} Hz", number(line.frequency_hz)));
             format!("{record}: {} {from}{}", counted(found.decays.len()), beside.unwrap_or_default())

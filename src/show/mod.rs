@@ -25,7 +25,7 @@ pub use csv::csv_text;
 pub use grid::grid;
 pub use json::artifact_json;
 pub use modes::{Row, mode_lines, moves, rows};
-pub use number::{named_with_std, number};
+pub use number::{about, named_with_std, number};
 pub use overview::{overview_json, overview_text, stage_head};
 pub use pretty::pretty;
 pub use size::size;

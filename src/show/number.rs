@@ -23,6 +23,12 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// A number that was looked at and not estimated: `about` and three significant digits.
+pub fn about(value: f64) -> String {
+    let rounded = format!("{value:.2e}").parse().unwrap_or(value);
+    format!("about {}", number(rounded))
+}
+
 /// The value of that name with its standard deviation, where it says anything.
 pub fn named_with_std(name: &str, value: f64, std: f64) -> String {
     if says(name, value, std) { with_std(value, std) } else { UNDETERMINED.to_owned() }
@@ -68,6 +74,7 @@ mod tests {
         for (value, text) in cases {
             assert_eq!(number(value), text);
         }
+        assert_eq!([about(47.126_8), about(762_615.0)], ["about 47.1", "about 763000"]);
     }
 
     #[test]
