@@ -68,6 +68,9 @@ impl Default for SlopeSensitivity {
     }
 }
 
+/// Volts of each unit of the piezo's monitor; one that is not stated is a volt.
+const VOLTS: [(&str, f64); 5] = [("", 1.0), ("V", 1.0), ("mV", 1e-3), ("uV", 1e-6), ("kV", 1e3)];
+
 const RECORDS: Port<Recording> = Port::new("records", "records", "the records; channels `deflection` and `piezo`");
 const SLOPES: Port<Table> = Port::new("slopes", "slopes", "every straight contact stretch and its slope");
 const SUMMARY: Port<Document> =
@@ -124,7 +127,7 @@ impl Stage for SlopeSensitivity {
     fn run(&self, inputs: &Ports, cx: &Context) -> Result<Ports, StageError> {
         let records = &inputs.get(&RECORDS)?.records;
         let rule = self.free.rule(common_rate(records)?, 0);
-        let piezo_m_per_v = self.travel(records)?;
+        let piezo = self.travel(records)?;
         cx.expect(records.len());
         let per_record = records
             .par_iter()
@@ -138,7 +141,7 @@ impl Stage for SlopeSensitivity {
         let all: Vec<SlopeStretch> = per_record.iter().flatten().copied().collect();
         let slope = contact_slope(&all).map_err(StageError::from_error)?;
         let gauge = SlopeGauge {
-            piezo_m_per_v: Estimate { value: piezo_m_per_v, std: self.piezo_m_per_v_std },
+            piezo_m_per_v: piezo,
             contact_stiffness_n_per_m: self.contact_stiffness_n_per_m,
             stiffness_n_per_m: self.stiffness_n_per_m,
         };
@@ -178,12 +181,16 @@ fn expect(outputs: &Ports) -> Result<String, String> {
 
 impl SlopeSensitivity {
     /// Metres of travel per unit of the piezo's channel. Errors: no such channel; neither its unit nor the config says it.
-    fn travel(&self, records: &[Record]) -> Result<f64, StageError> {
+    fn travel(&self, records: &[Record]) -> Result<Estimate, StageError> {
         let Some(record) = records.first() else { return Err(StageError::new("there is no record")) };
         let unit = record.channel(PIEZO)?.unit.trim();
         match (length_m(unit), self.piezo_m_per_v) {
-            (None, Some(given)) => Ok(given),
-            (Some(length), None) => Ok(length),
+            (None, Some(given)) => match VOLTS.iter().find(|(name, _)| *name == unit) {
+                Some((_, volts)) => Ok(Estimate { value: given * volts, std: self.piezo_m_per_v_std * volts }),
+                None => Err(StageError::new(format!("the piezo's channel is in {unit}, wanted volts or a length"))
+                    .at(&record.path)),
+            },
+            (Some(length), None) => Ok(Estimate { value: length, std: 0.0 }),
             (Some(_), Some(_)) => Err(StageError::new(format!("the piezo's channel is in {unit} already"))
                 .at(&record.path)
                 .help("leave `piezo_m_per_v` out")),

@@ -56,6 +56,25 @@ fn lever_a_has_its_published_sensitivity_and_spring_constant() {
     let document = outputs.get(&SUMMARY).unwrap().clone();
     let found: SensitivitySummary = document.read().unwrap();
     assert!(found.records_without_contact.is_empty());
+    // its monitor in millivolts, in nanometres, in what is neither
+    let in_unit = |unit: &str, factor: f64, stage: &SlopeSensitivity| {
+        let mut other = records.get(&RECORDS).unwrap().clone();
+        for channel in
+            other.records.iter_mut().flat_map(|record| &mut record.channels).filter(|one| one.role == "piezo")
+        {
+            channel.unit = unit.to_owned();
+            channel.scale_factor *= factor;
+        }
+        let outputs = stage.run(&Ports::new().with(&RECORDS, other), &cx)?;
+        outputs.get(&SUMMARY).unwrap().read::<SensitivitySummary>()
+    };
+    let same =
+        |other: SensitivitySummary| (other.apparent_v_per_m.value / found.apparent_v_per_m.value - 1.0).abs() < 1e-9;
+    assert!(
+        same(in_unit("mV", 1e3, &slope).unwrap()) && same(in_unit("nm", 25.0, &SlopeSensitivity::default()).unwrap())
+    );
+    assert!(in_unit("nm", 25.0, &slope).unwrap_err().to_string().contains("is in nm already"));
+    assert!(in_unit("deg", 1.0, &slope).unwrap_err().to_string().contains("wanted volts or a length"));
     // 60 N/m under 3.8 N/m reads 5.96 % low
     assert!((found.apparent_v_per_m.value / 1e7 - 60.0 / 63.8).abs() < 2e-3, "{found:?}");
 
