@@ -303,6 +303,17 @@ pub fn one_channel<'a>(
     Ok(Choice::of(goal, vec![channel], why))
 }
 
+/// Channels that are the same number throughout, as words behind a sentence; nothing where there are none.
+fn idle(source: &Source) -> String {
+    let is_idle = |channel: &&Channel| channel.values.as_ref().is_some_and(|values| values.least == values.largest);
+    let idle: Vec<&str> = source.channels.iter().filter(is_idle).map(|channel| channel.location.as_str()).collect();
+    match idle[..] {
+        [] => String::new(),
+        [one] => format!("; {one} is the same number throughout"),
+        _ => format!("; {} are the same number throughout", idle.join(", ")),
+    }
+}
+
 /// Whether noise in any of the signals has a resonance in it.
 fn resonates(signals: &[Vec<f64>]) -> bool {
     signals.iter().any(|values| resonance_segment(values).is_some())
@@ -393,7 +404,8 @@ fn decay<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, guessed: bool) -> Result
             return Ok(thermal(file, wanted, other(Goal::Thermal, format!("{record}: {reason}"))?));
         }
         (None, Some(reason)) if guessed => {
-            let none = format!("{reason}; no steady oscillation and no resonance in noise either");
+            let idle = idle(source);
+            let none = format!("{reason}; no steady oscillation and no resonance in noise either{idle}");
             let help = "look at it with `afmid inspect`; --channel names the signal, --goal says what to find";
             let help = steps.into_iter().chain([help.to_owned()]).collect::<Vec<_>>().join("; ");
             return Err((format!("{}: no free decay, {none}", source.file.display()), Some(help)));

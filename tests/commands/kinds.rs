@@ -73,6 +73,16 @@ fn thermal_motion_is_no_decay() {
 }
 
 #[test]
+fn an_input_that_does_nothing_is_named() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let here = scratch.path();
+    table(here, "force (N),acc (m/s^2)", 1e3, &[vec![0.0; 4096], white(3, 4096)]);
+    let output = command(here, &["new", "pipeline", "data.csv", "-o", "c.toml"]).output().expect("afmid starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && said.contains("force is the same number throughout"), "{said}");
+}
+
+#[test]
 fn an_input_of_one_sine_claims_nothing_elsewhere() {
     // two real poles; an oscillation; an oscillation and a real pole: y(k) = a y(k-1) + b y(k-2) + c y(k-3) + u(k-1)
     for (seed, turn, of) in [(1, 0.1, [1.2, -0.35, 0.0]), (2, 0.8, [0.5, -0.9, 0.0]), (3, 1.2, [2.4, -2.05, 0.63])] {
