@@ -107,11 +107,11 @@ pub struct NewPipelineArgs {
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct SpringArgs {
     /// Of a spring constant: travel of the piezo in metres a volt of its monitor, where its channel is in volts.
-    #[arg(long, value_name = "M_PER_V", value_parser = above_zero)]
+    #[arg(long, value_name = "M_PER_V", value_parser = above_zero, allow_hyphen_values = true)]
     pub piezo: Option<f64>,
     /// Of a spring constant: stiffness of the contact between tip and sample in N/m, or `rigid` where it is much stiffer
     /// than the lever.
-    #[arg(long, value_name = "N_PER_M", value_parser = contact)]
+    #[arg(long, value_name = "N_PER_M", value_parser = contact, allow_hyphen_values = true)]
     pub contact: Option<ContactSpring>,
 }
 

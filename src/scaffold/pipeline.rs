@@ -193,6 +193,7 @@ pub fn pipeline(source: &Source, choice: &Choice<'_>, wanted: Wanted<'_>, folder
 /// then; in a quarter of that a line and a mode are hard to tell apart.
 const MOST_FREE_SAMPLES: usize = 65_536;
 
+/// Samples of a segment of the free stretches of force curves.
 pub fn free_segment_samples(choice: &Choice<'_>) -> usize {
     (2 * segment_samples(choice.channels[0].samples)).min(MOST_FREE_SAMPLES)
 }

@@ -15,6 +15,13 @@ const LOWEST_SHARE: f64 = 1.0 / 500.0;
 /// Share above which it is not, below half the rate by what a filter against aliases takes.
 const HIGHEST_SHARE: f64 = 0.4;
 
+/// Duration of the blocks that tell free stretches from contact: some periods of a lever's first mode.
+const BLOCK_S: f64 = 1e-4;
+/// Samples of a block that the stages take by themselves, for a rate of 5 MS/s.
+const BLOCK_SAMPLES: f64 = 512.0;
+/// Samples of a block at least.
+const LEAST_BLOCK_SAMPLES: f64 = 16.0;
+
 /// Errors: what is of a spring constant is said of something else.
 pub fn is_wanted(wanted: &Wanted<'_>) -> Result<(), Question> {
     let said = match (wanted.spring.piezo, wanted.spring.contact) {
@@ -62,14 +69,30 @@ pub fn choice<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>) -> Result<Choice<'a
         "the slope of {} against {} in contact, the noise in free stretches",
         chosen.channels[0].location, piezo.location
     );
-    Ok(Choice { piezo: Some(piezo), free_stretches: true, why, ..chosen })
+    let exact = match wanted.spring.contact {
+        Some(ContactSpring::NPerM(_)) => Some(
+            "the contact's stiffness is taken as exact: `contact_stiffness_std_n_per_m` of the stage `stiffness` states its error",
+        ),
+        _ => None,
+    };
+    let notes = exact.into_iter().map(str::to_owned).collect();
+    Ok(Choice { piezo: Some(piezo), free_stretches: true, why, notes, ..chosen })
 }
 
 /// The `params` of the sensitivity's stage; none where the piezo's channel is in a length.
 pub fn sensitivity(choice: &Choice<'_>, spring: SpringArgs) -> String {
     let volts = choice.piezo.is_none_or(|piezo| length_m(piezo.unit.trim()).is_none());
-    let travel = spring.piezo.filter(|_| volts);
-    travel.map(|travel| format!("params = {{ piezo_m_per_v = {travel:e} }}\n")).unwrap_or_default()
+    let travel = spring.piezo.filter(|_| volts).map(|travel| format!("piezo_m_per_v = {travel:e}"));
+    let free = free(choice).map(|free| format!("free = {}", Value::Table(free)));
+    let params: Vec<String> = travel.into_iter().chain(free).collect();
+    if params.is_empty() { String::new() } else { format!("params = {{ {} }}\n", params.join(", ")) }
+}
+
+/// What a free stretch is at rates far from those of the default; none at others.
+fn free(choice: &Choice<'_>) -> Option<Table> {
+    let samples = (BLOCK_S * choice.channels[0].sample_rate_hz?).round().max(LEAST_BLOCK_SAMPLES);
+    let is_far = !(0.5..=2.0).contains(&(samples / BLOCK_SAMPLES));
+    is_far.then(|| Table::from_iter([("block_samples".to_owned(), Value::Integer(samples as i64))]))
 }
 
 /// The `params` of the spring constant's stage.
@@ -80,6 +103,7 @@ pub fn stiffness(choice: &Choice<'_>, spring: SpringArgs) -> String {
         ContactSpring::Rigid => Value::String("rigid".to_owned()),
     });
     contact.into_iter().for_each(|contact| drop(params.insert("contact_stiffness_n_per_m".to_owned(), contact)));
+    free(choice).into_iter().for_each(|free| drop(params.insert("free".to_owned(), Value::Table(free))));
     if let Some(rate) = choice.channels[0].sample_rate_hz {
         let mut peak = Table::new();
         let samples = i64::try_from(free_segment_samples(choice)).unwrap_or(i64::MAX);

@@ -21,6 +21,8 @@ fn a_spring_constant_asks_for_travel_and_contact_and_its_error_holds() {
     assert!(stray.contains("wanted --goal spring-constant"), "{stray}");
     let no_mode = refused(&["modes", "archive", "--goal", "spring-constant"]);
     assert!(no_mode.contains("is no mode"), "{no_mode}");
+    let negative = refused(&[&new[..], &["--piezo", "-25e-9", "--contact", "60"]].concat());
+    assert!(negative.contains("wanted a number above 0"), "{negative}");
     let of = |contact: &str| {
         let (config, result) = (format!("{contact}.toml"), format!("{contact}.h5"));
         afmid(here, &[&new[..], &["--piezo", "25e-9", "--contact", contact, "-o", &config]].concat());
@@ -33,6 +35,9 @@ fn a_spring_constant_asks_for_travel_and_contact_and_its_error_holds() {
     // the simulated lever; its shape's factor is 0.83, the uniform beam's 0.8175 has an error of 0.01 for that
     assert!((k - 3.8).abs() < 3.0 * std && std < 0.1 * k, "{k} +- {std}");
     let (rigid, _) = of("rigid");
+    // a contact that is much stiffer is as good as rigid, to rounding of the config's numbers
+    let (stiff, stiff_std) = of("1e12");
+    assert!((stiff / rigid - 1.0).abs() < 1e-9 && stiff_std > 0.0, "{stiff} +- {stiff_std}, {rigid}");
     // what gives way under the lever takes (60 / 63.8)^2
     assert!((rigid / k - 0.884).abs() < 0.01, "{rigid} of {k}");
 }

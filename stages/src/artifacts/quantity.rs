@@ -50,6 +50,14 @@ pub fn quantity_of_unit(unit: &str) -> Option<Quantity> {
     known(unit).map(|(quantity, _)| quantity)
 }
 
+/// Metres of a unit of length, by its symbol or its name; none of any other unit.
+pub fn length_m(unit: &str) -> Option<f64> {
+    let named = unit.to_lowercase().replace("metre", "meter");
+    let named = named.strip_suffix('s').unwrap_or(&named);
+    let by_name = || WRITTEN_OUT.iter().find(|(name, _)| *name == named);
+    LENGTHS.iter().find(|(name, _)| *name == unit).or_else(by_name).map(|(_, metres)| *metres)
+}
+
 /// The SI unit of a quantity.
 fn si_unit(quantity: Quantity) -> &'static str {
     match quantity {
@@ -65,11 +73,17 @@ const FORCES: [(&str, f64); 4] = [("/kN", 1e3), ("/mN", 1e-3), ("/uN", 1e-6), ("
 /// Metres of each unit of length; the longest name that fits counts.
 const LENGTHS: [(&str, f64); 7] =
     [("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6), ("nm", 1e-9), ("m", 1.0)];
-/// Metres of a unit of length; none of any other unit.
-pub fn length_m(unit: &str) -> Option<f64> {
-    LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, metres)| *metres)
-}
-
+/// The same by names in the singular and small letters, and what has no prefix.
+const WRITTEN_OUT: [(&str, f64); 8] = [
+    ("\u{e5}", 1e-10),
+    ("angstrom", 1e-10),
+    ("picometer", 1e-12),
+    ("nanometer", 1e-9),
+    ("micrometer", 1e-6),
+    ("micron", 1e-6),
+    ("millimeter", 1e-3),
+    ("meter", 1.0),
+];
 /// Standard acceleration of gravity, exact (CGPM 1901).
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
 
@@ -107,6 +121,10 @@ mod tests {
             (length_m("nm"), length_m("m"), length_m("V"), length_m("m/s")),
             (Some(1e-9), Some(1.0), None, None)
         );
+        // the letter and the sign of an angstrom
+        let named = ["\u{c5}", "\u{212b}", "Angstrom", "nanometers", "Micrometre", "metres", "second", ""];
+        let metres = [Some(1e-10), Some(1e-10), Some(1e-10), Some(1e-9), Some(1e-6), Some(1.0), None, None];
+        assert_eq!(named.map(length_m), metres);
         for other in ["", "V/N", "m", "m/V", "N/m", "mol/N", "m/s^3/N"] {
             assert_eq!(known(other), None, "{other}");
         }

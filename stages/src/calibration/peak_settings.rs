@@ -26,7 +26,8 @@ pub struct PeakSettings {
     pub band: f64,
 }
 
-/// Standard errors by which the variance of a lower peak is above that of a higher one.
+/// Standard errors by which the variance of a lower peak is above that of a higher one. Why: chance does that once in thirty
+/// thousand spectra.
 const LEAST_DISTANCE: f64 = 4.0;
 /// Quality factor of a lower peak: what 1/f noise is fitted by has less than one, a lever in water two.
 const LEAST_QUALITY: f64 = 1.5;

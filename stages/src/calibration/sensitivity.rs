@@ -8,9 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::free_rule::FreeSettings;
-use crate::artifacts::{PIEZO, length_m};
-
 use super::reading::{common_rate, read_blocks, read_free};
+use crate::artifacts::{PIEZO, length_m};
 use afmid_kernels::calibration::{
     ContactSlope, Estimate, Sensitivity, SlopeGauge, SlopeStretch, contact_slope, contact_stretches, sensitivity,
 };

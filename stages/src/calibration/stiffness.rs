@@ -154,7 +154,7 @@ pub struct RelativeErrors {
 impl Stage for ThermalStiffness {
     const SPEC: Spec = Spec {
         name: "calibration.stiffness",
-        version: 4,
+        version: 5,
         summary: "spring constant from the thermal peak of mode 1 in the free stretches",
         inputs: &[RECORDS.spec(), SENSITIVITY.spec()],
         outputs: &[SPECTRUM.spec(), SUMMARY.spec()],

@@ -86,8 +86,8 @@ pub fn spring_constant(
                     wanted: "wanted more than four times the apparent spring constant: no lever gives this slope over a softer contact",
                 });
             }
-            // x = k/k_c solves x = ratio (1 + x)^2
-            let x = (1.0 - 2.0 * ratio - (1.0 - 4.0 * ratio).sqrt()) / (2.0 * ratio);
+            // x = k/k_c solves x = ratio (1 + x)^2: the smaller root without a difference of numbers that are almost equal
+            let x = 2.0 * ratio / (1.0 - 2.0 * ratio + (1.0 - 4.0 * ratio).sqrt());
             (x, contact.std / contact.value)
         }
     };
@@ -179,6 +179,18 @@ mod tests {
         // the second order of 1 %
         assert!((step(|k| k.stiffness_n_per_m) - 1.0).abs() < 0.02);
         assert!((step(|k| k.sensitivity_v_per_m) - 1.0).abs() < 0.02);
+        // what is stiffer by any factor is rigid in the limit: a part of 2 k/k_c beside what rounding leaves
+        let k = apparent.stiffness_n_per_m;
+        for contact in (2..=300).map(|power| 10_f64.powi(power)) {
+            let found = of_contact(contact, 0.0);
+            let away = found.stiffness_n_per_m.value / k.value - 1.0;
+            let limit = 2.0 * k.value / contact;
+            assert!((away - limit).abs() < 3.0 * limit * limit + 1e-14, "{contact}: {away}");
+            assert!(found.sensitivity_v_per_m.value >= gauge.sensitivity_v_per_m.value, "{contact}");
+        }
+        gauge.contact_stiffness_n_per_m = Some(exact(1e15));
+        let std = spring_constant(46.3e3, variance, &gauge).unwrap().stiffness_n_per_m.std;
+        assert!((std / k.std - 1.0).abs() < 1e-12);
         gauge.contact_stiffness_n_per_m = Some(exact(10.0));
         assert!(spring_constant(46.3e3, variance, &gauge).is_err());
     }
