@@ -79,7 +79,7 @@ impl Stage for Decay {
     const HAS_KERNEL_OPTIONS: bool = true;
     const SPEC: Spec = Spec {
         name: "events.decay",
-        version: 12,
+        version: 13,
         summary: "finds free decays in records: where they begin, where they drown in the noise",
         inputs: &[RECORDS.spec()],
         outputs: &[DECAYS.spec(), EVENTS.spec(), SUMMARY.spec()],
@@ -123,8 +123,8 @@ impl Stage for Decay {
         let clipped: usize = rows.iter().map(|row| row.clipped).sum();
         if clipped > 0 {
             cx.warn(format!(
-                "{clipped} samples lie at an end of their channel's range, as of an amplifier or converter that was overdriven: \
-                 they are left out (column `clipped` of `events`)"
+                "{clipped} samples lie at an end of their channel's range, cut off or at rest, and are left out (column \
+                 `clipped` of `events`)"
             ));
         }
         let quiet: Vec<Vec<Vec<f64>>> = searched.iter().flat_map(Searched::quiet).collect();

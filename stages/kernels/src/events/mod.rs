@@ -36,7 +36,7 @@ pub use fractional_shift::{REACH, band_limited_derivative, fractional_shift};
 pub use kind::EventKind;
 pub use level_change::{LevelChange, level_change};
 pub use onset::{Baseline, Onset, baseline, first_sustained_departure};
-pub use saturation::saturated_samples;
+pub use saturation::{saturated_ends, saturated_samples};
 pub use shift_refinement::{Refined, refine_shift};
 
 #[cfg(test)]

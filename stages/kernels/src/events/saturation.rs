@@ -12,9 +12,12 @@
 /// # Shapes
 /// One window of values; equal codes must be equal values. NaN are ignored. Cost: one to five passes.
 pub fn saturated_samples(values: &[f64]) -> usize {
-    let high = pile_up(values.iter().copied());
-    let low = pile_up(values.iter().map(|value| -value));
-    high + low
+    saturated_ends(values).into_iter().sum()
+}
+
+/// The same at either end: how many pile up at the least value and at the largest one.
+pub fn saturated_ends(values: &[f64]) -> [usize; 2] {
+    [pile_up(values.iter().map(|value| -value)), pile_up(values.iter().copied())]
 }
 
 pub(super) fn pile_up(values: impl Iterator<Item = f64> + Clone) -> usize {

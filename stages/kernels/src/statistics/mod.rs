@@ -24,4 +24,4 @@ pub use gamma::{chi_square_level, chi_square_tail, gamma_tail, ln_gamma, normal_
 pub use half_sample_mode::half_sample_mode;
 pub use median::{median, median_and_scale};
 pub use share::clopper_pearson;
-pub use slow::without_slow;
+pub use slow::{without_slow, without_steps};

@@ -141,7 +141,7 @@ pub(super) const SUMMARY: Port<Document> =
 impl Stage for Columns {
     const SPEC: Spec = Spec {
         name: "io.columns",
-        version: 10,
+        version: 11,
         summary: "reads measured input and output from the channels of a file of any format",
         inputs: &[],
         outputs: &[PAIR.spec(), SUMMARY.spec()],

@@ -14,6 +14,9 @@ const STRONG: f64 = 0.05;
 const SLOWEST: usize = 16;
 /// Depth of the valley below an oscillation's line: drift has none.
 const VALLEY: f64 = 0.5;
+/// Power of the differences about an oscillation over that on the one side where it is less: of a step all of it is the same, but
+/// for what noise leaves.
+const OVER_A_STEP: f64 = 1.5;
 
 /// Oscillations of a record, cycles per sample.
 pub(super) struct Pitch {
@@ -26,21 +29,24 @@ impl Pitch {
     ///
     /// Method: periodograms of the differences from a straight line, each over its own sum; power within 12 % of each
     /// frequency, in which a line counts whole and drift, whose density falls with the square, little. No taper: it
-    /// would hide a decay at an end of the record.
+    /// would hide a decay at an end of the record. A step, which has lobes, is told by the differences between samples, in which
+    /// it has none.
     pub fn of(channels: &[&[f64]]) -> Self {
         let samples = channels[0].len();
         let plan = RealTransform::new(samples);
         let mut power = vec![0.0; plan.bins()];
+        let mut of_differences = vec![0.0; plan.bins()];
         for channel in channels {
             let own = plan.power(without_line(channel));
             // drift does not count in the norm either
             let total: f64 = own.iter().enumerate().skip(LEAST_PERIODS).map(|(k, p)| k as f64 * p).sum();
             if total > 0.0 {
                 power.iter_mut().zip(own).for_each(|(s, p)| *s += p / total);
+                let own = plan.power(differences(channel));
+                of_differences.iter_mut().zip(own).for_each(|(s, p)| *s += p / total);
             }
         }
-        let mut sums = vec![0.0];
-        power.iter().for_each(|p| sums.push(sums[sums.len() - 1] + p));
+        let (sums, sums_of_differences) = (sums_of(&power), sums_of(&of_differences));
         let last = power.len() - 1;
         let level = median(&mut power[1..].to_vec()) / std::f64::consts::LN_2;
         let band = |k: usize| {
@@ -63,7 +69,20 @@ impl Pitch {
         let around = |k: usize| ((0.7 * k as f64) as usize).max(1)..=((1.4 * k as f64).ceil() as usize).min(last);
         let largest = largest_of(&bands, (0..=last).map(around));
         let is_peak = |k: usize| bands[k] > 0.0 && valley[k] < VALLEY * bands[k] && bands[k] >= largest[k];
-        let peaks: Vec<usize> = (first..=last).filter(|&k| is_peak(k)).collect();
+        let density = |from: f64, to: f64| {
+            let (from, to) = ((from.ceil() as usize).min(last), (to.floor() as usize).min(last));
+            (sums_of_differences[to.max(from) + 1] - sums_of_differences[from]) / (to.max(from) + 1 - from) as f64
+        };
+        let is_no_step = |k: &usize| {
+            let at = *k as f64;
+            let beside = density(0.4 * at, 0.7 * at).min(density(1.4 * at, 2.5 * at));
+            density(0.88 * at, 1.12 * at) > OVER_A_STEP * beside
+        };
+        let all: Vec<usize> = (first..=last).filter(|&k| is_peak(k)).collect();
+        let mut peaks: Vec<usize> = all.iter().copied().filter(is_no_step).collect();
+        if peaks.is_empty() {
+            peaks = all;
+        }
         // times the frequency: slow wander cannot win; then by power among those that are not far slower
         let weight = |k: usize| k as f64 * bands[k];
         let anchor = peaks.iter().copied().max_by(|&a, &b| weight(a).total_cmp(&weight(b))).unwrap_or(first);
@@ -99,6 +118,19 @@ fn largest_of(values: &[f64], windows: impl Iterator<Item = RangeInclusive<usize
         queue.front().map_or(f64::NEG_INFINITY, |&k| values[k])
     };
     windows.map(largest).collect()
+}
+
+/// Sums of the values before each, and of all.
+fn sums_of(values: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    values.iter().for_each(|value| sums.push(sums[sums.len() - 1] + value));
+    sums
+}
+
+/// Each value less the one before it, about their mean; the first is zero.
+fn differences(values: &[f64]) -> Vec<f64> {
+    let mean = (values[values.len() - 1] - values[0]) / (values.len() - 1).max(1) as f64;
+    std::iter::once(0.0).chain(values.windows(2).map(|pair| pair[1] - pair[0] - mean)).collect()
 }
 
 /// A stretch less its least-squares line.

@@ -48,6 +48,36 @@ fn weak_hits_are_found_before_and_after_strong_ones() {
     }
 }
 
+#[test]
+fn what_is_let_go_after_any_hold_is_a_decay() {
+    let (samples, rate) = (8000, 2e3);
+    let (mut wrong, mut all) = (0, 0);
+    for (place, share) in [0.02, 0.06, 0.125, 0.25, 0.4, 0.5].into_iter().enumerate() {
+        for seed in 0..10 {
+            let draws = white_noise(3, 1.0, 100 * place as u64 + seed);
+            let (hz, ratio) = (22.0 * (0.5 * draws[0].clamp(-2.0, 2.0)).exp(), 0.015 * (0.5 * draws[1]).exp());
+            let noise = white_noise(samples, 3e-3 * (0.7 * draws[2]).exp(), 7000 + 100 * place as u64 + seed);
+            let held = (share * samples as f64) as usize;
+            let at = |k: usize| {
+                let w = std::f64::consts::TAU * hz * (k.max(held) - held) as f64 / rate;
+                (-ratio * w).exp() * w.cos()
+            };
+            let y: Vec<f64> = (0..samples).map(|k| at(k) + noise[k]).collect();
+            let found = find_decays(&[&y], rate, &DecaySearchOptions::default()).unwrap();
+            let right = |d: &FreeDecay| {
+                (d.frequency_hz / hz - 1.0).abs() < 0.05 && d.range.start.abs_diff(held) as f64 * hz < 0.5 * rate
+            };
+            all += 1;
+            if found.decays.len() != 1 || !right(&found.decays[0]) {
+                println!("{share} {seed}, {hz} Hz, {ratio}: {:?} {:?}", found.decays, found.dismissed);
+                wrong += 1;
+            }
+        }
+    }
+    println!("{wrong} of {all} wrong");
+    assert!(wrong <= 1);
+}
+
 /// Tones of equal amplitude 1 whose frequencies are more than a bin apart, falling by `fall` nepers over the record.
 fn tones(seed: u64, count: usize, fall: f64, noise: f64) -> Vec<f64> {
     let samples = 8000;

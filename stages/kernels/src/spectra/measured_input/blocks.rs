@@ -3,7 +3,7 @@
 use crate::signal::hann;
 use crate::spectra::SpectrumError;
 use crate::spectra::error::finite;
-use crate::statistics::{median, median_and_scale, without_slow};
+use crate::statistics::{median, median_and_scale, without_slow, without_steps};
 
 /// Inputs and outputs over the same samples.
 #[derive(Debug, Clone)]
@@ -161,13 +161,17 @@ const SHORT: f64 = 0.01;
 const OUT_OF_NOISE: f64 = 12.0;
 
 /// Whether an input is a hammer's: half of its energy, less that of its noise, lies within a hundredth of its samples. What
-/// wanders slower is left out.
+/// wanders slower is left out, and a step to another level, which is no hit.
 pub fn is_impulsive(input: &[f64]) -> bool {
     let few = |samples: usize| samples as f64 <= (SHORT * input.len() as f64).ceil();
     if few(half_energy_samples(input)) {
         return true;
     }
-    let mut swings = without_slow(input);
+    is_short(without_slow(input), few) && is_short(without_steps(input), few)
+}
+
+/// Whether half of the energy of swings, less that of their noise, lies within few samples.
+fn is_short(mut swings: Vec<f64>, few: impl Fn(usize) -> bool) -> bool {
     let (_, noise) = median_and_scale(&mut swings.clone());
     let largest = swings.iter().map(|y| y.abs()).fold(0.0, f64::max);
     if largest <= OUT_OF_NOISE * noise {

@@ -325,5 +325,11 @@ fn a_force_of_hits_is_recognised_in_noise_and_drift() {
         let mut burst = white_noise(16_000, 1e-3, seed + 60);
         burst[4000..5600].iter_mut().zip(white_noise(1600, 1.0, seed + 70)).for_each(|(y, e)| *y += e);
         assert!(!is_impulsive(&burst));
+        // a step to another level, without and with noise, or up and down again
+        for (noise, ends) in [(0.0, 16_000), (0.02, 16_000), (0.02, 11_000)] {
+            let mut steps = white_noise(16_000, noise, seed + 80);
+            steps[7993 + 40 * seed as usize..ends].iter_mut().for_each(|y| *y += 1.0);
+            assert!(!is_impulsive(&steps), "{noise}, {ends}");
+        }
     }
 }
