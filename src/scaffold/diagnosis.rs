@@ -124,14 +124,36 @@ fn forced<'a>(file: &FirstFile<'a>, wanted: &Wanted<'_>, looks: Choice<'a>) -> R
     let output = one_output(file, wanted, &looks.inputs)?;
     one_file(source, "input and output")?;
     let (longest, note) = longest(file, &looks.inputs, output, wanted)?;
-    let middle = longest.start.midpoint(longest.end);
-    let stretches = note.is_some().then_some([longest.start..middle, middle..longest.end]);
+    let (middle, waits) = middle(file, &looks.inputs, &longest)?;
+    let is_whole = note.is_none() && waits.is_none();
+    let stretches = (!is_whole).then_some([longest.start..middle, middle..longest.end]);
     let measured = if looks.inputs.len() > 1 { "inputs" } else { "input" };
     let (names, record) = (listed(&looks.inputs), source.name());
     let why = format!("measured {measured} {names} and output {} in {record}", output.location);
-    let notes = looks.notes.into_iter().chain(note).collect();
+    let notes = looks.notes.into_iter().chain(note).chain(waits).collect();
     let diagnosis = Some(Diagnosed { reference: None, stretches });
     Ok(Choice { inputs: looks.inputs, notes, diagnosis, ..Choice::of(Goal::InputOutput, vec![output], why) })
+}
+
+/// Where learning from a stretch of inputs and output ends and judging begins: in the middle, or in that of what comes after the
+/// first change where no input moves before; and what to say then. Errors: the inputs cannot be read.
+fn middle(
+    file: &FirstFile<'_>,
+    inputs: &[&Channel],
+    stretch: &Range<usize>,
+) -> Result<(usize, Option<String>), Question> {
+    let middle = stretch.start.midpoint(stretch.end);
+    let mut first: Option<usize> = None;
+    for input in inputs {
+        let values = file.samples(input)?;
+        let own = values.get(stretch.clone()).unwrap_or_default();
+        let change = own.iter().position(|value| Some(value) != own.first()).map(|place| stretch.start + place);
+        first = first.into_iter().chain(change).min();
+    }
+    let Some(late) = first.filter(|change| *change >= middle) else { return Ok((middle, None)) };
+    let end = late.midpoint(stretch.end);
+    let said = format!("no input moves before sample {late}: what is learnt from reaches to sample {end}");
+    Ok((end, Some(said)))
 }
 
 /// An axis in its control loop: what it is to follow, the drive, and at most one more input.

@@ -156,7 +156,7 @@ const JUDGED: Port<Table> = Port::new("judged", "diagnosis-judged", "errors over
 impl Stage for CausesDiagnose {
     const SPEC: Spec = Spec {
         name: "diagnosis.causes",
-        version: 15,
+        version: 16,
         summary: "names what a linear model gets wrong: inputs and outputs, decays, servo axes, steady oscillations",
         inputs: &[PAIR.spec(), DECAYS.spec(), RECORDS.spec()],
         outputs: &[SUMMARY.spec(), LADDER.spec(), SIMULATION.spec(), ERRORS.spec(), JUDGED.spec(), MODEL.spec()],

@@ -176,6 +176,7 @@ impl CausesDiagnose {
             one_unit: measured.one_unit,
             linear_fit: self.linear_fit,
             most_causes: self.most_causes,
+            work: DiagnosisOptions::default().work,
             candidates: catalogue().into_iter().filter(usable).collect(),
             output_unit: measured.output_unit.clone(),
             input_unit: measured.input_unit.clone(),

@@ -17,7 +17,7 @@ use super::selection::{Choice, Search};
 use super::simulation::{ModalSimulation, Simulation};
 use super::steady_lines::SteadyLines;
 use super::story::{Story, story};
-use super::unnamed_law::{UnnamedLaw, simpler_law, unnamed_law};
+use super::unnamed_law::{Laws, simpler_law, unnamed_law};
 use super::validation::check_part;
 use super::verdict::{Diagnosis, Verdict};
 use crate::Unwatched;
@@ -123,9 +123,9 @@ fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions)
         None => baselines(records, &sample, &starts, options)?,
     };
     let mut extended = Vec::new();
-    let mut work = WORK;
+    let mut work = options.work;
     for baseline in found {
-        let (found, used) = extend(baseline, options, work.max(WORK / LEAST_SHARE));
+        let (found, used) = extend(baseline, options, work.max(options.work / LEAST_SHARE));
         work = work.saturating_sub(used);
         let enough = found.adequate && (found.far_better || !found.is_lacking(options));
         extended.push(found);
@@ -134,22 +134,31 @@ fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions)
         }
     }
     let Some((last, simpler)) = best_of(extended) else { return Err(DiagnosisError::NoBaseline) };
-    let law_of_simpler = simpler.iter().find_map(|simpler| last.beaten_by_a_law_of(simpler, options));
+    let mut of_simpler = Laws::default();
+    for simpler in &simpler {
+        let laws = last.laws_of(simpler, options);
+        of_simpler = Laws { untried: of_simpler.untried || laws.untried, ..laws };
+        if of_simpler.lacking.is_some() {
+            break;
+        }
+    }
     let on_sample = last.choice.ladder.last().map_or(f64::NAN, |last| last.fit.loss);
-    let Extended { bench, blocks, choice, adequate, .. } = last
+    // of a long record laws without a name are sought where causes were, on fewer samples
+    let before = (!last.is_whole(interval_s, options)).then(|| last.unnamed_laws(options));
+    let whole = last
         .on_all(records, interval_s, options)
         .or_else(|| last.linear_on_all(records, interval_s, options))
         .ok_or(DiagnosisError::NoBaseline)?;
+    let (laws, on_laws) = match before {
+        Some(laws) => (laws, on_sample),
+        None => (whole.unnamed_laws(options), whole.choice.ladder.last().map_or(f64::NAN, |last| last.fit.loss)),
+    };
+    let Extended { bench, blocks, mut choice, adequate, .. } = whole;
     let Some(last) = choice.ladder.last() else { return Err(DiagnosisError::NoBaseline) };
     let misfit = misfit(&bench, &last.fit, &blocks);
-    let unnamed = unnamed_law(
-        &bench,
-        [&choice.ladder[0].fit, &last.fit],
-        &blocks,
-        &candidates(options, &bench, &last.fit.model),
-        ALARMS_OF_LAW * options.false_alarm_rate,
-    );
-    let unnamed = law_of_simpler.map(|law| law.scaled(last.fit.loss / on_sample)).or(unnamed);
+    let untried = laws.untried || of_simpler.untried;
+    let of_simpler = of_simpler.lacking.map(|law| law.scaled(last.fit.loss / on_sample));
+    let unnamed = of_simpler.or_else(|| laws.lacking.map(|law| law.scaled(last.fit.loss / on_laws)));
     let first = &choice.ladder[0].fit;
     let linear = first.model.clone();
     let simulated = [&first.simulated[..], &last.fit.simulated];
@@ -166,6 +175,7 @@ fn modelled(records: &[Record<'_>], interval_s: f64, options: &DiagnosisOptions)
     };
     let (before, mut after) = (in_units(&choice.ladder[0].fit.simulated), in_units(&last.fit.simulated));
     let (output, extended) = (in_units(&bench.output), last.fit.model.clone());
+    choice.untried.laws = untried && unnamed.is_none();
     let findings = Findings { bench: &bench, records, options, blocks, choice, misfit, unnamed, adequate };
     let mut diagnosis = findings.answer();
     let named = if diagnosis.verdict == Verdict::Named { &extended } else { &linear };
@@ -245,17 +255,29 @@ impl Extended {
             || self.choice.lacks(&misfit(&self.bench, &last.fit, &self.blocks), options.tolerated_misfit)
     }
 
-    /// A law without a name that extends a simpler linear model to leave less than all causes of this one; none where this
+    /// Laws without a name that extend a simpler linear model to leave less than all causes of this one; none where this
     /// one has fewer than two.
-    fn beaten_by_a_law_of(&self, simpler: &Self, options: &DiagnosisOptions) -> Option<UnnamedLaw> {
-        let (first, last) = (&simpler.choice.ladder.first()?.fit, &self.choice.ladder.last()?.fit);
+    fn laws_of(&self, simpler: &Self, options: &DiagnosisOptions) -> Laws {
+        let (Some(first), Some(last)) = (simpler.choice.ladder.first(), self.choice.ladder.last()) else {
+            return Laws::default();
+        };
+        let (first, last) = (&first.fit, &last.fit);
         let same = self.bench.stretches == simpler.bench.stretches && self.bench.interval_s == simpler.bench.interval_s;
         if last.model.causes.len() < 2 || !same {
-            return None;
+            return Laws::default();
         }
         let candidates = candidates(options, &simpler.bench, &first.model);
         let level = ALARMS_OF_LAW * options.false_alarm_rate;
-        simpler_law(&simpler.bench, first, last, &simpler.blocks, &candidates, level)
+        simpler_law(&simpler.bench, first, last, &simpler.blocks, &candidates, level, options.work / 2)
+    }
+
+    /// Laws without a name that it lacks.
+    fn unnamed_laws(&self, options: &DiagnosisOptions) -> Laws {
+        let ladder = &self.choice.ladder;
+        let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else { return Laws::default() };
+        let candidates = candidates(options, &self.bench, &last.fit.model);
+        let level = ALARMS_OF_LAW * options.false_alarm_rate;
+        unnamed_law(&self.bench, [&first.fit, &last.fit], &self.blocks, &candidates, level, options.work / 2)
     }
 
     fn criterion(&self) -> f64 {
@@ -302,6 +324,7 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extende
         options,
         trials: trials(&bench, &fit, &candidates),
         end: begin + work,
+        end_of_rivals: begin + work + options.work / LEAST_SHARE,
         candidates,
     };
     let choice = search.run(fit);
@@ -314,10 +337,8 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extende
     (Extended { bench, blocks, choice, adequate, far_better }, used)
 }
 
-/// Steps of sections that the searches from all baselines may take together: single causes take a tenth of it, five causes
-/// of a measured system most of it.
-const WORK: u64 = 2_000_000_000;
-/// Of that each baseline has one in so many, whatever those before it took.
+/// Of the work that searches may take each baseline has one in so many, whatever those before it took, and as much again for
+/// rivals of what it found.
 const LEAST_SHARE: u64 = 8;
 
 /// Fewest records that show a change from one to the next: its slope, and whether it is one.

@@ -54,8 +54,25 @@ impl Findings<'_> {
                 .chain(self.follows())
                 .chain(self.companion())
                 .chain(self.changed())
+                .chain(self.untried())
                 .collect(),
         }
+    }
+
+    /// What the limit of work left untried, in a sentence; none where it was not reached.
+    fn untried(&self) -> Option<String> {
+        let untried = self.choice.untried;
+        let what = [
+            (untried.causes, "further causes"),
+            (untried.rivals, "their rivals"),
+            (untried.laws, "laws without a name"),
+        ];
+        let what: Vec<&str> = what.into_iter().filter(|(is_left, _)| *is_left).map(|(_, what)| what).collect();
+        let found: Vec<&str> = self.choice.chosen.iter().map(|chosen| chosen.about.id).collect();
+        let found = if found.is_empty() { "no cause".to_owned() } else { found.join(", ") };
+        (!what.is_empty()).then(|| {
+            format!("the search came to its limit of work with {found}: {} were not tried", what.join(" and "))
+        })
     }
 
     /// Mean square on what names have to gain on of the last model without the named causes that do not stand, refitted.

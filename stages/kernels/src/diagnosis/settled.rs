@@ -119,9 +119,9 @@ impl Extended {
         if models.len() > 1 {
             ladder.push(last);
         }
-        let nearest = self.choice.nearest.clone();
+        let (nearest, untried) = (self.choice.nearest.clone(), self.choice.untried);
         Some(Self {
-            choice: Choice { ladder, chosen, nearest },
+            choice: Choice { ladder, chosen, nearest, untried },
             bench,
             blocks,
             adequate: self.adequate,
@@ -138,8 +138,14 @@ impl Extended {
         let mut start = if here { first.fit.model.clone() } else { with_own(&bench, &first.fit.model) };
         start.dynamics.interval_s = interval_s;
         let ladder = vec![Judged::new(Fit::new(&bench, &start, Until::MINIMUM)?, &bench, &blocks)];
-        let choice = Choice { ladder, chosen: Vec::new(), nearest: self.choice.nearest.clone() };
+        let (nearest, untried) = (self.choice.nearest.clone(), self.choice.untried);
+        let choice = Choice { ladder, chosen: Vec::new(), nearest, untried };
         Some(Self { choice, bench, blocks, adequate: false, far_better: false })
+    }
+
+    /// Whether the search had all samples.
+    pub fn is_whole(&self, interval_s: f64, options: &DiagnosisOptions) -> bool {
+        self.bench.stretches == options.training && self.bench.interval_s == interval_s
     }
 
     /// All samples, and whether they are those that the search had.
@@ -149,8 +155,7 @@ impl Extended {
         interval_s: f64,
         options: &DiagnosisOptions,
     ) -> Option<(bool, Bench)> {
-        let here = self.bench.stretches == options.training && self.bench.interval_s == interval_s;
-        if here {
+        if self.is_whole(interval_s, options) {
             return Some((true, self.bench.clone()));
         }
         let highest_hz = self.choice.ladder.first()?.fit.model.dynamics.highest_hz();

@@ -150,11 +150,16 @@ const IDS: [&str; 21] = [
 const NOISE: f64 = 5e-3;
 
 fn diagnosed(seed: u64, hidden: &[(&str, Vec<f64>)], without: &[&str]) -> Diagnosis {
+    within(DiagnosisOptions::default().work, seed, hidden, without)
+}
+
+/// The same with a limit of work.
+fn within(work: u64, seed: u64, hidden: &[(&str, Vec<f64>)], without: &[&str]) -> Diagnosis {
     let (input, output) = simulated(seed, hidden, NOISE);
     let candidates: Vec<&'static dyn Cause> =
         IDS.iter().filter(|id| !without.contains(id)).filter_map(|id| find(id)).collect();
     let training = vec![Stretch { record: 0, first: 0, end: SAMPLES }];
-    let options = DiagnosisOptions { training, candidates, ..DiagnosisOptions::default() };
+    let options = DiagnosisOptions { training, candidates, work, ..DiagnosisOptions::default() };
     let record = Record { input: &input, outputs: vec![&output] };
     diagnose(&[record], 1.0 / RATE_HZ, &options).expect("a diagnosis").diagnosis
 }
@@ -167,6 +172,21 @@ fn names(diagnosis: &Diagnosis) -> Vec<String> {
 /// docs/results/input-output.md.
 fn rounds() -> u64 {
     std::env::var("AFMID_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(few_or_all(1, 2))
+}
+
+#[test]
+fn what_was_not_tried_at_the_limit_of_work_is_said_and_nothing_is_named() {
+    for seed in 0..2 {
+        let hidden = [("duffing", vec![4e-3]), ("output-quadratic", vec![3e-3])];
+        let whole = diagnosed(seed, &hidden, &[]);
+        assert_eq!((whole.verdict, names(&whole).len()), (Verdict::Named, 2), "{seed}: {whole:?}");
+        // no work at all; enough for some
+        for work in [0, 3_000_000] {
+            let cut = within(work, seed, &hidden, &[]);
+            let said = cut.evidence.iter().filter(|line| line.contains("came to its limit of work")).count();
+            assert_eq!((cut.verdict, names(&cut).len(), said), (Verdict::Unexplained, 0, 1), "{seed} {work}: {cut:?}");
+        }
+    }
 }
 
 #[test]

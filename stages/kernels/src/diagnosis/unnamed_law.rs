@@ -25,10 +25,17 @@ pub(super) struct UnnamedLaw {
     pub alone: Option<f64>,
 }
 
+/// What was found of laws without a name.
+#[derive(Debug, Default)]
+pub(super) struct Laws {
+    /// The one that a model lacks.
+    pub lacking: Option<UnnamedLaw>,
+    /// Whether the limit of work left some that are fitted alone unfitted.
+    pub untried: bool,
+}
+
 /// Laws that are fitted in the place of all causes.
 const FITTED: usize = 3;
-/// Steps of sections after which no further law is fitted: half of what all searches for causes may take.
-const WORK: u64 = 1_000_000_000;
 
 /// The term of the library that would take most of a fit's residual, of those that are significant; or, where names are
 /// many, one of the largest that alone does better than all of them.
@@ -49,22 +56,25 @@ pub(super) fn unnamed_law(
     blocks: &Blocks,
     candidates: &[Candidate],
     false_alarm_rate: f64,
-) -> Option<UnnamedLaw> {
+    work: u64,
+) -> Laws {
     let mut found = significant(bench, fit, blocks, false_alarm_rate);
     let beside = beside_laws(bench, baseline, fit);
     let laws = fit.model.causes.len() - beside.as_ref().unwrap_or(baseline).model.causes.len();
     let before = beside.as_ref().unwrap_or(baseline);
-    let end = bench.work() + WORK;
-    let beaten = laws > 0 && fit_alone(bench, [before, fit], &mut found, candidates, end);
-    if laws > 1 && !beaten {
+    let end = bench.work() + work;
+    let mut ended =
+        if laws > 0 { fit_alone(bench, [before, fit], &mut found, candidates, end) } else { Ended::NoneBeats };
+    if laws > 1 && ended != Ended::Beaten {
         // what several names share is seen whole before any of them came
         let mut first = significant(bench, before, blocks, false_alarm_rate);
-        fit_alone(bench, [before, fit], &mut first, candidates, end);
+        ended = ended.or(fit_alone(bench, [before, fit], &mut first, candidates, end));
         first.retain(|(law, _)| law.beats(bench, fit));
         found.extend(first);
     }
     let place = found.iter().position(|(law, _)| law.beats(bench, fit)).unwrap_or(0);
-    (place < found.len()).then(|| found.swap_remove(place).0)
+    let lacking = (place < found.len()).then(|| found.swap_remove(place).0);
+    Laws { lacking, untried: ended == Ended::Limit }
 }
 
 /// A law without a name that beside a simpler linear model leaves less than a richer one with all its causes, `fit`; none
@@ -76,35 +86,55 @@ pub(super) fn simpler_law(
     blocks: &Blocks,
     candidates: &[Candidate],
     false_alarm_rate: f64,
-) -> Option<UnnamedLaw> {
+    work: u64,
+) -> Laws {
     let before = beside_laws(bench, simpler, fit);
     let before = before.as_ref().unwrap_or(simpler);
     let mut found = significant(bench, before, blocks, false_alarm_rate);
-    fit_alone(bench, [before, fit], &mut found, candidates, bench.work() + WORK);
-    found.into_iter().map(|(law, _)| law).find(|law| law.beats(bench, fit))
+    let ended = fit_alone(bench, [before, fit], &mut found, candidates, bench.work() + work);
+    let lacking = found.into_iter().map(|(law, _)| law).find(|law| law.beats(bench, fit));
+    Laws { lacking, untried: ended == Ended::Limit }
+}
+
+/// How fits of laws alone ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ended {
+    /// With one that beats all causes.
+    Beaten,
+    /// None does.
+    NoneBeats,
+    /// None of those that the limit of work left time for.
+    Limit,
+}
+
+impl Ended {
+    /// Of two in turn, the first of which has not beaten.
+    fn or(self, next: Self) -> Self {
+        if next == Self::Beaten || self == Self::NoneBeats { next } else { self }
+    }
 }
 
 /// Fits the linear model with each of the largest forces that no candidate is, until one beats all causes of a fit or so much
-/// work is done; whether one does.
+/// work is done.
 fn fit_alone(
     bench: &Bench,
     [linear, fit]: [&Fit; 2],
     found: &mut [(UnnamedLaw, Option<Candidate>)],
     candidates: &[Candidate],
     end: u64,
-) -> bool {
+) -> Ended {
     let unnamed = |force: &Candidate| !candidates.iter().any(|own| same(own, force));
     let forces = found.iter_mut().filter_map(|(law, force)| Some((law, force.as_ref()?)));
     for (law, force) in forces.filter(|(_, force)| unnamed(force)).take(FITTED) {
         if bench.work() > end {
-            return false;
+            return Ended::Limit;
         }
         law.alone = alone(bench, linear, force);
         if law.beats(bench, fit) {
-            return true;
+            return Ended::Beaten;
         }
     }
-    false
+    Ended::NoneBeats
 }
 
 /// The linear model with those causes of a fit that imitate no law: the course of the input between samples and what is added

@@ -65,6 +65,19 @@ pub(crate) struct Choice {
     pub chosen: Vec<Chosen>,
     /// What came nearest where nothing was added: id, share of the squared residual that it would take.
     pub nearest: Vec<(&'static str, f64)>,
+    /// What was not tried at the limit of work.
+    pub untried: Untried,
+}
+
+/// What a search leaves that comes to its limit of work.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Untried {
+    /// Further causes whose signs are large enough.
+    pub causes: bool,
+    /// Rivals of the causes that were found.
+    pub rivals: bool,
+    /// Laws without a name.
+    pub laws: bool,
 }
 
 impl Choice {

@@ -2,7 +2,7 @@
 
 mod choice;
 
-pub(crate) use choice::{Choice, Chosen, Judged};
+pub(crate) use choice::{Choice, Chosen, Judged, Untried};
 
 use super::data::Bench;
 use super::dynamics::Model;
@@ -49,6 +49,8 @@ pub(crate) struct Search<'a> {
     pub trials: usize,
     /// The bench's work at which the search ends, with what it has then.
     pub end: u64,
+    /// The bench's work up to which what it has then is held against rivals.
+    pub end_of_rivals: u64,
 }
 
 impl Search<'_> {
@@ -85,44 +87,53 @@ impl Search<'_> {
     /// Whether a ladder has as many causes as it may, or the search has taken as long as it may: what needs so many, or
     /// so long, is not in the catalogue.
     fn is_full(&self, ladder: &[Judged]) -> bool {
-        ladder.len() > self.options.most_causes || self.bench.work() > self.end
+        ladder.len() > self.options.most_causes || self.is_spent()
+    }
+
+    /// Whether the search has taken as long as it may.
+    fn is_spent(&self) -> bool {
+        self.bench.work() > self.end
     }
 
     /// The search from a ladder on, without a candidate.
     fn from(&self, mut ladder: Vec<Judged>, banned: Option<&Candidate>) -> Choice {
         let mut chosen = Vec::new();
         let mut nearest = Vec::new();
+        let mut untried = Untried::default();
         let mut examined = 0;
         // an exchange lowers the loss, so that this ends; the bounds are for ties by rounding and for many causes that
         // stand in for one that is not in the catalogue
         for round in 0..ROUNDS {
-            nearest = self.climb(&mut ladder, banned);
+            (nearest, untried.causes) = self.climb(&mut ladder, banned);
             examined += ladder.len() - 1;
             let may_change = round + 1 < ROUNDS && examined < EXAMINED && !self.is_full(&ladder);
             match self.examined(&ladder, may_change) {
-                Examined::Stands(causes) => {
+                Examined::Stands(causes, all_opposed) => {
                     chosen = causes;
+                    untried.rivals = !all_opposed;
                     break;
                 }
                 Examined::Changes(model) => ladder = self.rebuilt(&ladder[0], &model),
             }
         }
-        Choice { ladder, chosen, nearest }
+        Choice { ladder, chosen, nearest, untried }
     }
 
-    /// Adds one cause after another; gives what came nearest at the last step.
-    fn climb(&self, ladder: &mut Vec<Judged>, banned: Option<&Candidate>) -> Vec<(&'static str, f64)> {
+    /// Adds one cause after another; gives what came nearest at the last step, and whether the limit of work left some of it
+    /// untried.
+    fn climb(&self, ladder: &mut Vec<Judged>, banned: Option<&Candidate>) -> (Vec<(&'static str, f64)>, bool) {
         loop {
-            let Some(current) = ladder.last().cloned() else { return Vec::new() };
+            let Some(current) = ladder.last().cloned() else { return (Vec::new(), false) };
             let mut promises = screen(self.bench, &current.fit, &self.candidates);
             promises.retain(|promise| !banned.is_some_and(|banned| banned.is(&promise.candidate)));
             let nearest = promises.iter().take(3).map(|p| (p.candidate.id(), p.gain / current.fit.loss)).collect();
             if self.is_full(ladder) {
-                return nearest;
+                let may_be_more = ladder.len() <= self.options.most_causes;
+                return (nearest, may_be_more && promises.iter().any(|promise| self.could_matter(&current, promise)));
             }
             match self.best(&current, &promises) {
                 Some(next) => ladder.push(self.best_instants(self.best_choice(next))),
-                None => return nearest,
+                None => return (nearest, false),
             }
         }
     }
@@ -278,12 +289,14 @@ impl Search<'_> {
 
     /// Holds each cause of the last model against its absence and against its rivals.
     fn examined(&self, ladder: &[Judged], may_change: bool) -> Examined {
-        let Some(here) = ladder.last() else { return Examined::Stands(Vec::new()) };
+        let Some(here) = ladder.last() else { return Examined::Stands(Vec::new(), true) };
         let sample = self.sample(&here.fit);
         let mut chosen = Vec::new();
+        let mut all_opposed = true;
         for which in 0..here.fit.model.causes.len() {
-            // without rivals where time is up: what is left decides
-            if self.bench.work() > self.end {
+            // without rivals where time is up, too
+            if self.bench.work() > self.end_of_rivals {
+                all_opposed = false;
                 chosen.push(self.unopposed(&sample, ladder, which));
                 continue;
             }
@@ -320,7 +333,7 @@ impl Search<'_> {
             }
             chosen.push(found);
         }
-        Examined::Stands(chosen)
+        Examined::Stands(chosen, all_opposed)
     }
 
     /// A cause as it was added, held against nothing.
@@ -407,8 +420,8 @@ impl Search<'_> {
 
 /// Whether a model's causes stand.
 enum Examined {
-    /// Each, with what it was held against.
-    Stands(Vec<Chosen>),
+    /// Each, with what it was held against; whether every one was held against rivals.
+    Stands(Vec<Chosen>, bool),
     /// The model without a superfluous cause, or with a better one in its place.
     Changes(Model),
 }
