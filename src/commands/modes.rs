@@ -19,13 +19,18 @@ const KIND: &str = "modes";
 /// Writes the config, runs it, writes the page, and prints the table and what to type next. Errors, usage: a goal that is
 /// no modes; as `new pipeline` and `run`.
 pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
-    if args.goal == Some(Goal::Diagnosis) {
-        let help = "`afmid diagnose` says what a linear model gets wrong".to_owned();
-        return Err(Failure::usage("a diagnosis lists no modes", Some(help)));
-    }
-    if args.goal == Some(Goal::SpringConstant) {
-        let help = "`afmid new pipeline --goal spring-constant` writes the config, `afmid run` finds it".to_owned();
-        return Err(Failure::usage("a spring constant is no mode", Some(help)));
+    let without_modes = match args.goal {
+        Some(Goal::Diagnosis) => {
+            Some(("a diagnosis lists no modes", "`afmid diagnose` says what a linear model gets wrong"))
+        }
+        Some(Goal::SpringConstant) => Some((
+            "a spring constant is no mode",
+            "`afmid new pipeline --goal spring-constant` writes the config, `afmid run` finds it",
+        )),
+        _ => None,
+    };
+    if let Some((problem, help)) = without_modes {
+        return Err(Failure::usage(problem, Some(help.to_owned())));
     }
     let answered = answered(&args.at_once, args.goal, KIND, registry)?;
     let last = answered.last();
@@ -52,7 +57,22 @@ pub fn run(args: &ModesArgs, registry: &Registry) -> Result<(), Failure> {
     let nonlinear = moves(found).then(|| {
         format!("a mode that moves is not linear; what by: afmid diagnose {}", words(&args.at_once.recordings))
     });
-    print(&answered.text(mode_lines(found).into_iter().chain([next]).chain(nonlinear)))
+    let missed = missed(found).map(|fit| {
+        format!(
+            "the FIT of what was held out is {fit:.0} %; whether noise is all that is missing: afmid diagnose {}",
+            words(&args.at_once.recordings)
+        )
+    });
+    print(&answered.text(mode_lines(found).into_iter().chain([next]).chain(nonlinear).chain(missed)))
+}
+
+/// FIT of what was held out from which on a linear model is good without a further look, per cent: a hundredth of the squared
+/// output is left.
+const GOOD_FIT: f64 = 90.0;
+
+/// The FIT of what was held out, per cent, where it is less than good.
+fn missed(summary: &Value) -> Option<f64> {
+    summary.pointer("/fit_percent/held_out").and_then(Value::as_f64).filter(|fit| *fit < GOOD_FIT)
 }
 
 /// A path as a word that no shell and no command reads as anything else.
