@@ -1,5 +1,6 @@
 //! The ledger: what became of each data set, a small file each, so that processes share neither lock nor database.
 
+use std::collections::HashSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -118,6 +119,13 @@ impl Ledger {
             }
             entry.result_bytes = there;
         }
+    }
+
+    /// How many data sets it has beside these.
+    pub fn beside(&self, names: &HashSet<&str>) -> usize {
+        let listed = std::fs::read_dir(self.folder.join("ledger")).into_iter().flatten().flatten();
+        let name = |file: std::fs::DirEntry| Some(file.file_name().to_str()?.strip_suffix(".json")?.to_owned());
+        listed.filter_map(name).filter(|name| !name.starts_with('.') && !names.contains(&name[..])).count()
     }
 
     /// Whether the result file of a finished data set is there, as long as it was.

@@ -10,7 +10,7 @@ use afmid_pipeline::{Artifact, Plan};
 use serde_json::json;
 
 use super::load::load;
-use super::run::{PROGRAM, default_folder, open_cache, warn, written_folders};
+use super::run::{PROGRAM, default_folder, is_of_another, open_cache, warn, written_folders};
 use super::sweep::refuse;
 use super::target::make_folder;
 use crate::batch::dataset::{DataSet, Replaced, sorted};
@@ -21,7 +21,7 @@ use crate::batch::work::{Done, Work, all};
 use crate::cli::{BatchArgs, ConfigArgs, SetsArgs};
 use crate::failure::{Failure, Message};
 use crate::interrupt;
-use crate::output::print;
+use crate::output::{print, say};
 use crate::printable::{message, one_line, shown};
 use crate::progress::Sets;
 use crate::show::{artifact_text, pretty};
@@ -36,7 +36,10 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
     // a shard writes none: the run with `--collect` does
     let tables = args.shard.is_none().then(|| Tables::open(&folder, BATCH)).transpose()?;
     let own = |set: &&DataSet| args.shard.is_none_or(|shard| shard.holds(&set.name));
-    let done = computed(args, &planned(&args.config, sets.iter().filter(own), stages)?, &ledger)?;
+    let plans = planned(&args.config, sets.iter().filter(own), stages)?;
+    let notes = there(&folder, &ledger, &sets, &plans);
+    let done = computed(args, &plans, &ledger)?;
+    notes.iter().for_each(|note| say(&format!("{note}\n")));
     let entries: Vec<Entry> = done.iter().map(|done| done.entry.clone()).collect();
     let title = Title { name: whole.name(), seed: whole.seed(), config: whole.config_text(), program: PROGRAM };
     let table = tables.map(|tables| tables.write_batch(&title, &entries)).transpose()?;
@@ -52,6 +55,34 @@ pub fn run(args: &BatchArgs, stages: &dyn Stages) -> Result<(), Failure> {
             ),
         ))),
     }
+}
+
+/// Results that are looked at for what they were made of: more take longer than they are worth.
+const LOOKED_AT: usize = 1000;
+
+/// What is to be said of the results that lie in the folder already: those of another config or of other files, which this
+/// batch replaces, and those that it has not.
+fn there(folder: &Path, ledger: &Ledger, sets: &[DataSet], plans: &[(&DataSet, Plan)]) -> Vec<String> {
+    let replaced =
+        plans.iter().take(LOOKED_AT).filter(|(set, plan)| is_of_another(&ledger.result(&set.name), plan)).count();
+    let beside = ledger.beside(&sets.iter().map(|set| &set.name[..]).collect());
+    let results = |count: usize| if count == 1 { "1 result".to_owned() } else { format!("{count} results") };
+    let folder = shown(folder);
+    let of_replaced = || {
+        let (was, are) = if replaced == 1 { ("was", "is") } else { ("were", "are") };
+        format!(
+            "{} in {folder} {was} of another config or of other files: {are} replaced (-o keeps both)",
+            results(replaced)
+        )
+    };
+    let of_beside = || {
+        format!(
+            "{} in {folder} of data sets that this batch has not: left there, and not in its summary",
+            results(beside)
+        )
+    };
+    let all = [(replaced > 0).then(of_replaced), (beside > 0).then(of_beside)];
+    all.into_iter().flatten().collect()
 }
 
 /// The plan of the config alone. Errors, usage: what is wrong with it; it has no stage whose files a batch can replace.

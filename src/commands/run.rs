@@ -63,12 +63,17 @@ pub fn run(args: &RunArgs, stages: &dyn Stages) -> Result<(), Failure> {
 
 /// That a result of another config, or of other files, lies where the new one goes; none where nothing is lost by it.
 fn replaced(output: &Path, plan: &Plan) -> Option<String> {
-    let file = ResultFile::open(output).ok()?;
-    let old = file.run();
-    let same = old.config == plan.config_text() && old.overrides == plan.config.overrides;
     let name = shown(output);
-    (!same)
+    is_of_another(output, plan)
         .then(|| format!("{name} was the result of another config or of other files: it is replaced (-o keeps both)"))
+}
+
+/// Whether a result of another config, or of other files, lies there.
+pub fn is_of_another(output: &Path, plan: &Plan) -> bool {
+    ResultFile::open(output).is_ok_and(|file| {
+        let old = file.run();
+        old.config != plan.config_text() || old.overrides != plan.config.overrides
+    })
 }
 
 /// Runs a plan and writes its result file, with progress on stderr. Errors: those of its stages, a file that cannot be

@@ -99,6 +99,19 @@ fn a_batch_takes_what_new_pipeline_wrote_and_files_and_its_folder_is_shown() {
     for column in ["damping_ratio", "damping_ratio_std", "verdict", "warnings", "first_warning"] {
         assert!(head.split(',').any(|own| own == column), "{column}: {head}");
     }
+    // the same again loses nothing; another config and another set of that name do
+    let again = |arguments: &[&str]| {
+        let more = [&["batch"], arguments, &["--cache", "cache", "-o", "sets"]].concat();
+        let output = command(here, &more).output().expect("afmid starts");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let said = again(&["modes.toml", "one", "two/hit_3.csv"]);
+    assert!(!said.contains("replaced") && !said.contains("left there"), "{said}");
+    let said = again(&["modes.toml", "one", "--set", "pipeline.seed=7"]);
+    assert!(said.contains("1 result in sets was of another config or of other files: is replaced"), "{said}");
+    assert!(said.contains("1 result in sets of data sets that this batch has not"), "{said}");
+    again(&["modes.toml", "one", "two/hit_3.csv"]);
     // the folder stands for its summary
     assert!(afmid(here, &["show", "sets"]).contains("summary.modes (table)"));
     let page = afmid(here, &["report", "sets", "--title", "Two <days>"]);

@@ -324,7 +324,7 @@ fn extend(baseline: Baseline, options: &DiagnosisOptions, work: u64) -> (Extende
         options,
         trials: trials(&bench, &fit, &candidates),
         end: begin + work,
-        end_of_rivals: begin + work + options.work / LEAST_SHARE,
+        for_rivals: options.work / LEAST_SHARE,
         candidates,
     };
     let choice = search.run(fit);

@@ -47,14 +47,14 @@ impl Findings<'_> {
             held_out: ends.map(|(before, after)| [before * before, after * after]),
             noise,
             against_clean: self.repeated().into_iter().chain(self.beyond_noise(noise)).collect(),
-            unlike_noise: self.unlike_noise(),
+            unlike_noise: self.unlike_noise().into_iter().chain(self.untried().filter(|_| !self.is_open())).collect(),
             against_all: self
                 .endless()
                 .into_iter()
                 .chain(self.follows())
                 .chain(self.companion())
                 .chain(self.changed())
-                .chain(self.untried())
+                .chain(self.untried().filter(|_| self.is_open()))
                 .collect(),
         }
     }
@@ -73,6 +73,11 @@ impl Findings<'_> {
         (!what.is_empty()).then(|| {
             format!("the search came to its limit of work with {found}: {} were not tried", what.join(" and "))
         })
+    }
+
+    /// Whether what was not tried speaks against the names that were found, not only against noise as what they leave.
+    fn is_open(&self) -> bool {
+        self.choice.untried.rivals || self.choice.untried.laws
     }
 
     /// Mean square on what names have to gain on of the last model without the named causes that do not stand, refitted.

@@ -12,6 +12,7 @@ use super::lack_of_fit::{Floor, misfit};
 use super::options::DiagnosisOptions;
 use super::score_test::{Candidate, Promise, Sample, other_choices, screen, significance};
 use crate::causes::{About, Cause};
+use crate::statistics::f_tail;
 
 /// Candidates that are fitted at each step.
 const REFITTED: usize = 5;
@@ -49,8 +50,8 @@ pub(crate) struct Search<'a> {
     pub trials: usize,
     /// The bench's work at which the search ends, with what it has then.
     pub end: u64,
-    /// The bench's work up to which what it has then is held against rivals.
-    pub end_of_rivals: u64,
+    /// Work beyond that for holding what it has then against rivals.
+    pub for_rivals: u64,
 }
 
 impl Search<'_> {
@@ -129,7 +130,7 @@ impl Search<'_> {
             let nearest = promises.iter().take(3).map(|p| (p.candidate.id(), p.gain / current.fit.loss)).collect();
             if self.is_full(ladder) {
                 let may_be_more = ladder.len() <= self.options.most_causes;
-                return (nearest, may_be_more && promises.iter().any(|promise| self.could_matter(&current, promise)));
+                return (nearest, may_be_more && promises.iter().any(|promise| self.is_sign(&current, promise)));
             }
             match self.best(&current, &promises) {
                 Some(next) => ladder.push(self.best_instants(self.best_choice(next))),
@@ -224,6 +225,15 @@ impl Search<'_> {
         promise.gain > 2.0 * mean_square
     }
 
+    /// Whether a promise is a sign that no search may leave untried: no chance in white residuals, and large enough.
+    fn is_sign(&self, current: &Judged, promise: &Promise) -> bool {
+        let (count, parameters) = (self.bench.count as f64, promise.values.len().max(1) as f64);
+        let ratio = promise.gain / (current.fit.loss / count) / parameters;
+        let p_value = self.corrected(f_tail(ratio, parameters, count), promise.candidate.cause);
+        let share = 1.0 - (1.0 - promise.gain / current.fit.loss).max(0.0).sqrt();
+        p_value < self.options.false_alarm_rate && share > self.options.least_gain
+    }
+
     /// Steps of a fit that only has to be compared.
     fn few(&self) -> usize {
         (WORK / self.bench.count.max(1)).clamp(10, 40)
@@ -293,9 +303,10 @@ impl Search<'_> {
         let sample = self.sample(&here.fit);
         let mut chosen = Vec::new();
         let mut all_opposed = true;
+        let end = self.bench.work().max(self.end) + self.for_rivals;
         for which in 0..here.fit.model.causes.len() {
             // without rivals where time is up, too
-            if self.bench.work() > self.end_of_rivals {
+            if self.bench.work() > end {
                 all_opposed = false;
                 chosen.push(self.unopposed(&sample, ladder, which));
                 continue;

@@ -29,7 +29,7 @@ impl Pitch {
     ///
     /// Method: periodograms of the differences from a straight line, each over its own sum; power within 12 % of each
     /// frequency, in which a line counts whole and drift, whose density falls with the square, little. No taper: it
-    /// would hide a decay at an end of the record. A step, which has lobes, is told by the differences between samples, in which
+    /// would hide a decay at an end of the record. A step, which has lobes, is seen in the differences between samples, in which
     /// it has none.
     pub fn of(channels: &[&[f64]]) -> Self {
         let samples = channels[0].len();
